@@ -1,0 +1,70 @@
+// bench/step.cpp
+// Time of a whole step, converged to the default tolerance: chains and trees of any size, robots, both solvers.
+//
+//   build/release/bench/bench_step [--benchmark_filter=chain]
+//
+// Before timing, each scene is run for a while and its energy checked; a scene that loses it is not timed.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+
+#include "bench/machine.hpp"
+#include "engine/initial_state.hpp"
+#include "engine/simulation.hpp"
+#include "layout/urdf.hpp"
+#include "models/generators.hpp"
+
+namespace linden {
+namespace {
+
+void step(benchmark::State& state, const Model& model, Solver solver) {
+  Simulation simulation(model, {.step = 1e-3, .solver = solver});
+  const InitialState start = random_state(model, 1, 0.1);
+  simulation.set_positions(start.positions);
+  simulation.set_velocities(start.velocities);
+  const Energy before = simulation.energy();
+  for (int k = 0; k < 10; ++k) {
+    if (const StepReport report = simulation.step(); !report.ok()) return state.SkipWithError(simulation.describe(report).c_str());
+  }
+  const Energy after = simulation.energy();
+  if (!(std::abs(after.total() - before.total()) < 1e-3 * (before.kinetic + after.kinetic))) {
+    return state.SkipWithError("energy is not kept");
+  }
+  double iterations = 0, evaluations = 0, steps = 0;
+  for (auto _ : state) {
+    const StepReport report = simulation.step();
+    if (!report.ok()) return state.SkipWithError(simulation.describe(report).c_str());
+    iterations += report.iterations;
+    evaluations += report.evaluations;
+    steps += 1;
+  }
+  state.counters["iterations"] = iterations / steps;
+  state.counters["evaluations"] = evaluations / steps;
+  per_body(state, model.tree.bodies());
+}
+
+void add(const std::string& name, const std::function<Model()>& make) {
+  for (const Solver solver : {Solver::newton, Solver::riqn}) {
+    benchmark::RegisterBenchmark(fmt::format("{}/{}", name, linden::name(solver)).c_str(),
+                                 [=](benchmark::State& state) { step(state, make(), solver); });
+  }
+}
+
+}  // namespace
+}  // namespace linden
+
+int main(int argc, char** argv) {
+  using namespace linden;
+  for (const Index size : {10, 100, 1000, 10000, 100000}) add(fmt::format("chain:{}", size), [=] { return chain(size); });
+  for (const Index size : {1023, 65535}) add(fmt::format("tree:{}", size), [=] { return balanced_tree(size); });
+  add("ball-chain:100", [] { return ball_chain(100); });
+  for (const char* robot : {LINDEN_MODELS_DIR "/humanoid.urdf", LINDEN_ROBOTS_DIR "/g1_29dof.urdf", LINDEN_ROBOTS_DIR "/talos.urdf"}) {
+    if (!std::filesystem::exists(robot)) continue;
+    add(std::filesystem::path(robot).stem().string(), [=] { return load_urdf(robot, Base::floating); });
+  }
+  describe_machine();
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+}

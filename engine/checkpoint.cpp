@@ -1,0 +1,108 @@
+// Checkpoints of a Simulation: one line of text, then the raw numbers.
+//
+//   "linden checkpoint 1\n"
+//   header: model hash, step, gravity, counts, steps taken, valid rows of history (little endian, as laid out below)
+//   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
+//   FNV-1a over all of it
+//
+// Raw bits, so that a run continued from it is bit-identical. Written beside the target and renamed: nothing half-written stays.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+
+#include "engine/output_file.hpp"
+#include "engine/simulation.hpp"
+#include "layout/builder.hpp"
+
+namespace linden {
+namespace {
+
+constexpr std::string_view kMagic = "linden checkpoint 1\n";
+
+struct Header {
+  std::uint64_t model_hash;
+  double step;
+  double gravity[3];
+  std::int64_t positions, velocities;
+  std::int64_t steps;
+  std::int64_t history;
+};
+static_assert(sizeof(Header) == 72, "a checkpoint's header has no padding");
+
+std::uint64_t checksum(std::string_view bytes) {
+  std::uint64_t state = 14695981039346656037ull;
+  for (const char byte : bytes) state = (state ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
+  return state;
+}
+
+template <class T>
+void append(std::string& bytes, const T* values, std::size_t count) {
+  bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
+}
+
+}  // namespace
+
+void Simulation::save(const std::string& file) const {
+  const Header header{model_->hash(),
+                      options_.step,
+                      {options_.gravity[0], options_.gravity[1], options_.gravity[2]},
+                      model_->tree.shape.positions,
+                      model_->tree.shape.velocities,
+                      steps_,
+                      history_};
+  std::string bytes(kMagic);
+  append(bytes, &header, 1);
+  State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
+    append(bytes, field.flat().data(), field.flat().size());
+  });
+  const std::uint64_t sum = checksum(bytes);
+  append(bytes, &sum, 1);
+
+  write_file(file, bytes);
+}
+
+void Simulation::load(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw InputError(fmt::format("{}: the checkpoint cannot be read; does the file exist?", file));
+  const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  if (!bytes.starts_with(kMagic)) throw InputError(fmt::format("{}: this is no checkpoint of linden", file));
+
+  State<double> loaded;
+  loaded.allocate(model_->tree.shape);
+  Header header{};
+  const std::size_t body = kMagic.size() + sizeof(Header);
+  if (bytes.size() < body + sizeof(std::uint64_t)) throw InputError(fmt::format("{}: the checkpoint is cut short", file));
+  std::memcpy(&header, bytes.data() + kMagic.size(), sizeof(Header));
+  if (header.model_hash != model_->hash()) {
+    throw InputError(fmt::format("{}: this checkpoint belongs to another model ({} positions, {} velocities) than \"{}\" ({}, {}), or "
+                                 "to one with other masses or lengths",
+                                 file, header.positions, header.velocities, model_->names.model, model_->tree.shape.positions,
+                                 model_->tree.shape.velocities));
+  }
+  if (header.step != options_.step || !std::equal(std::begin(header.gravity), std::end(header.gravity), options_.gravity.begin())) {
+    throw InputError(fmt::format("{}: this checkpoint was made with a step of {} s and gravity {} {} {}; the simulation has {} s and {} "
+                                 "{} {}, so it would not continue the same run",
+                                 file, header.step, header.gravity[0], header.gravity[1], header.gravity[2], options_.step,
+                                 options_.gravity[0], options_.gravity[1], options_.gravity[2]));
+  }
+  std::size_t expected = body + sizeof(std::uint64_t);
+  State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) { expected += field.bytes(); });
+  std::uint64_t sum = 0;
+  std::memcpy(&sum, bytes.data() + bytes.size() - sizeof(sum), sizeof(sum));
+  if (bytes.size() != expected || sum != checksum(std::string_view(bytes).substr(0, bytes.size() - sizeof(sum)))) {
+    throw InputError(fmt::format("{}: the checkpoint is damaged or cut short ({} bytes, expected {})", file, bytes.size(), expected));
+  }
+  const char* next = bytes.data() + body;
+  State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) {
+    std::memcpy(field.flat().data(), next, field.bytes());
+    next += field.bytes();
+  });
+  state_ = loaded;
+  steps_ = header.steps;
+  history_ = static_cast<int>(header.history);
+  stepper_.refresh(state_);
+}
+
+}  // namespace linden

@@ -1,0 +1,105 @@
+#include "engine/drift.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/mass_distribution.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+/// Whether no joint ties any body to the world: all roots are carried by free joints.
+bool floats(const Tree& tree) {
+  const auto tied = [&](const Run& run) { return run.kind != JointKind::free && tree.level(run.begin) == 1; };
+  return std::ranges::none_of(tree.runs, tied);
+}
+
+/// Nothing moved and nothing drifted: 0.
+double relative(double drift, double scale) { return drift == 0 ? 0 : drift / scale; }
+
+}  // namespace
+
+void LineFit::add(double x, double y) {
+  points_ += 1;
+  const double dx = x - mean_x_, dy = y - mean_y_, n = static_cast<double>(points_);
+  mean_x_ += dx / n;
+  mean_y_ += dy / n;
+  xx_ += dx * (x - mean_x_);
+  xy_ += dx * (y - mean_y_);
+  yy_ += dy * (y - mean_y_);
+}
+
+double LineFit::slope() const { return points_ < 2 ? kUnknown : xy_ / xx_; }
+
+double LineFit::slope_error() const {
+  if (points_ < 3) return kUnknown;
+  const double left = std::max(0.0, yy_ - xy_ * xy_ / xx_);  // squares that the line does not explain
+  return std::sqrt(left / static_cast<double>(points_ - 2) / xx_);
+}
+
+void EnergyDrift::add(double time, const Energy& energy) {
+  if (samples_ == 0) {
+    begin_ = time;
+    initial_ = lowest_ = highest_ = energy.total();
+  }
+  lowest_ = std::min(lowest_, energy.total());
+  highest_ = std::max(highest_, energy.total());
+  scale_ = std::max(scale_, energy.kinetic);
+  const std::int64_t stretch = std::min<std::int64_t>(samples_ * kStretches / samples_expected_, kStretches - 1);
+  line_.add(time - begin_, energy.total() - initial_);
+  stretches_[static_cast<std::size_t>(stretch)].add(time - begin_, energy.total() - initial_);
+  samples_ += 1;
+}
+
+double EnergyDrift::slope_error() const {
+  LineFit means;
+  for (const LineFit& stretch : stretches_) {
+    if (stretch.points() > 0) means.add(stretch.mean_x(), stretch.mean_y());
+  }
+  if (means.points() < kStretches / 2) return kUnknown;
+  // what is left of one stretch resembles the next: correlation of neighbours, as of a first-order process
+  double products = 0, squares = 0, before = 0;
+  for (const LineFit& stretch : stretches_) {
+    if (stretch.points() == 0) continue;
+    const double left = stretch.mean_y() - means.mean_y() - means.slope() * (stretch.mean_x() - means.mean_x());
+    products += left * before;
+    squares += left * left;
+    before = left;
+  }
+  constexpr double kMostCorrelation = 0.95;
+  const double correlation = squares > 0 ? std::clamp(products / squares, 0.0, kMostCorrelation) : 0;
+  return means.slope_error() * std::sqrt((1 + correlation) / (1 - correlation));
+}
+
+std::optional<MomentumDrift> MomentumDrift::of(Simulation& simulation) {
+  if (!floats(simulation.model().tree)) return std::nullopt;
+  return MomentumDrift(simulation);
+}
+
+MomentumDrift::MomentumDrift(Simulation& simulation)
+    : gravity_(!vector_of(simulation.options().gravity).isZero(0)), begin_(simulation.time()), first_(simulation.momentum()) {
+  const MassDistribution masses = mass_distribution(simulation.model(), simulation.positions());
+  mass_ = masses.mass;
+  polar_moment_ = masses.polar_moment;
+}
+
+void MomentumDrift::add(Simulation& simulation, const Energy& energy) {
+  const Eigen::Vector3d gravity = vector_of(simulation.options().gravity);
+  const Momentum now = simulation.momentum();
+  const Eigen::Vector3d angular = vector_of(now.angular) - vector_of(first_.angular);
+  const Eigen::Vector3d linear = vector_of(now.linear) - vector_of(first_.linear);
+  linear_ = std::max(linear_, (linear - mass_ * (simulation.time() - begin_) * gravity).norm());
+  angular_ = std::max(angular_, gravity_ ? std::abs(angular.dot(gravity.normalized())) : angular.norm());
+  kinetic_ = std::max(kinetic_, energy.kinetic);
+}
+
+double MomentumDrift::linear() const { return relative(linear_, std::sqrt(2 * mass_ * kinetic_)); }
+
+double MomentumDrift::angular() const { return relative(angular_, std::sqrt(2 * polar_moment_ * kinetic_)); }
+
+}  // namespace linden

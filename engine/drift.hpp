@@ -1,0 +1,87 @@
+// engine/drift.hpp
+// What a run should have kept and how far it strayed: energy, and momentum where nothing outside takes or gives any.
+//
+//   band     max H - min H
+//   slope    of the line through H(t) by least squares, with its standard error
+//   scale    the largest kinetic energy met: what energy there was to exchange. H itself has no zero.
+//
+// Neighbouring samples go up and down together, so the error of the slope comes from the means of 20 equal stretches of the run,
+// widened by sqrt((1 + c) / (1 - c)) where neighbouring stretches still have a correlation c: a slope within two or three errors of
+// zero is no drift that one can see.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/simulation.hpp"
+
+namespace linden {
+
+/// Least squares through (x, y), one point after another.
+class LineFit {
+ public:
+  void add(double x, double y);
+  std::int64_t points() const { return points_; }
+  double mean_x() const { return mean_x_; }
+  double mean_y() const { return mean_y_; }
+  /// NaN below two points.
+  double slope() const;
+  /// NaN below three points.
+  double slope_error() const;
+
+ private:
+  std::int64_t points_ = 0;
+  double mean_x_ = 0, mean_y_ = 0, xx_ = 0, xy_ = 0, yy_ = 0;
+};
+
+class EnergyDrift {
+ public:
+  /// `samples`: how many are expected.
+  explicit EnergyDrift(std::int64_t samples = 1) : samples_expected_(samples) {}
+
+  void add(double time, const Energy& energy);
+
+  std::int64_t samples() const { return samples_; }
+  double initial() const { return initial_; }         // H at the first sample [J]
+  double band() const { return highest_ - lowest_; }  // [J]
+  double slope() const { return line_.slope(); }      // [J/s]
+  double slope_error() const;                         // [J/s]; NaN where the run is too short to tell
+  double scale() const { return scale_; }             // [J]
+
+ private:
+  static constexpr int kStretches = 20;
+
+  std::int64_t samples_expected_, samples_ = 0;
+  double begin_ = 0, initial_ = 0, lowest_ = 0, highest_ = 0, scale_ = 0;
+  LineFit line_;
+  std::array<LineFit, kStretches> stretches_;
+};
+
+/// For systems that nothing ties to the world. Without gravity all six numbers are kept. With gravity P - m g t is, and of the angular
+/// momentum the component along gravity; neither is relative to a place.
+class MomentumDrift {
+ public:
+  /// Nothing where something outside takes momentum.
+  static std::optional<MomentumDrift> of(Simulation& simulation);
+
+  void add(Simulation& simulation, const Energy& energy);
+
+  bool gravity() const { return gravity_; }
+  /// Largest drift so far, relative to the largest momentum that the kinetic energy allows: |P| <= sqrt(2 m T),
+  /// |L| <= sqrt(2 J T), J the polar moment about the world's origin at the start.
+  double linear() const;
+  double angular() const;
+
+ private:
+  explicit MomentumDrift(Simulation& simulation);
+
+  bool gravity_ = false;
+  double mass_ = 0, polar_moment_ = 0, begin_ = 0, kinetic_ = 0;
+  double linear_ = 0, angular_ = 0;  // largest drift [kg m/s], [kg m^2/s]
+  Momentum first_;
+};
+
+}  // namespace linden

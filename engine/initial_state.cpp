@@ -1,0 +1,48 @@
+#include "engine/initial_state.hpp"
+
+#include <algorithm>
+
+#include "models/random.hpp"
+
+namespace linden {
+namespace {
+
+/// Length uniform in [0, most], direction uniform on the sphere.
+Eigen::Vector3d random_arrow(Random& random, double most) {
+  const double z = random.uniform(-1, 1), turn = random.uniform(0, 2 * std::numbers::pi), length = random.uniform(0, most);
+  const double across = std::sqrt(1 - z * z);
+  return length * Eigen::Vector3d(across * std::cos(turn), across * std::sin(turn), z);
+}
+
+}  // namespace
+
+InitialState random_state(const Model& model, std::uint64_t seed, double spread) {
+  const Tree& tree = model.tree;
+  const double rate = spread / std::sqrt(static_cast<double>(tree.levels() - 1));
+  Random random(seed);
+  InitialState state{model.neutral(), std::vector<double>(static_cast<std::size_t>(tree.shape.velocities), 0.0)};
+  const auto put = [](std::vector<double>& rows, Index first, const Eigen::Vector3d& value) {
+    for (int k = 0; k < 3; ++k) rows[static_cast<std::size_t>(first + k)] = value[k];
+  };
+  for (const Run& run : tree.runs) {
+    for (Index i = run.begin; i < run.end; ++i) {
+      const Index q = tree.first_q(i), v = tree.first_v(i);
+      if (run.kind == JointKind::screw) {
+        const double position = random.uniform(-spread, spread);
+        state.positions[static_cast<std::size_t>(q)] = std::clamp(position, model.attributes.lower(v), model.attributes.upper(v));
+        state.velocities[static_cast<std::size_t>(v)] = random.uniform(-rate, rate);
+        continue;
+      }
+      const Eigen::Vector3d turn = random_arrow(random, spread);
+      const double half = 0.5 * turn.norm();
+      const Index first = run.kind == JointKind::free ? q + 3 : q;
+      put(state.positions, first, half > 0 ? Eigen::Vector3d(std::sin(half) * turn.normalized()) : Eigen::Vector3d::Zero());
+      state.positions[static_cast<std::size_t>(first + 3)] = std::cos(half);
+      put(state.velocities, v, random_arrow(random, rate));
+      if (run.kind == JointKind::free) put(state.velocities, v + 3, random_arrow(random, spread));
+    }
+  }
+  return state;
+}
+
+}  // namespace linden

@@ -1,0 +1,28 @@
+// engine/initial_state.hpp
+// A random place to start from, the same on every machine for the same seed.
+//
+//   screw  position uniform in [-R, R] (rad or m) and moved into the joint's limits; speed uniform in [-R, R] / sqrt(depth) (per s)
+//   ball   turned from neutral about a random axis by an angle uniform in [0, R], angular speed up to R / sqrt(depth) about another
+//   free   as ball; position zero, linear speed up to R in a random direction
+//
+// depth: the number of levels of the tree. Down a chain the rates of joints add up like a random walk, so this lets the bodies of a
+// chain of 10,000 links turn no faster than those of a short one; without it their tips would move at a kilometre per second.
+//
+// Followers of mimic joints follow their leaders when a Simulation takes the numbers.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "layout/model.hpp"
+
+namespace linden {
+
+struct InitialState {
+  std::vector<double> positions;   // [nq]
+  std::vector<double> velocities;  // [nv]
+};
+
+InitialState random_state(const Model& model, std::uint64_t seed, double spread);
+
+}  // namespace linden

@@ -1,0 +1,25 @@
+// engine/load_model.hpp
+// From what a person writes on the command line to a model.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "layout/urdf.hpp"
+
+namespace linden {
+
+/// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N. `base` is for URDF files (fixed where it is not given);
+/// throws InputError where it is given for a generated model, and for whatever cannot be read.
+Model load_model(const std::string& name, std::optional<Base> base);
+
+/// "fixed" or "floating"; throws InputError for anything else.
+Base base_from(const std::string& text);
+
+/// How the model hangs on to the world, in words: "fixed base", "floating base", "2 of 3 roots float".
+std::string base_of(const Model& model);
+
+/// The model's warnings on stderr, the first five of them.
+void print_warnings(const Model& model);
+
+}  // namespace linden

@@ -1,0 +1,213 @@
+// engine/main.cpp
+// The program `linden`: commands, their options, and what becomes of mistakes.
+//
+//   exit codes  0 fine, 1 the run failed, 2 bad input, 130 interrupted
+//   messages    one line on stderr that begins with "linden: "; results on stdout
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "engine/inspect.hpp"
+#include "engine/load_model.hpp"
+#include "engine/run_command.hpp"
+#include "engine/text.hpp"
+#include "engine/version.hpp"
+#include "layout/words.hpp"
+
+namespace linden {
+namespace {
+
+/// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
+struct Texts {
+  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread;
+};
+
+std::array<double, 3> gravity_from(const std::string& text) {
+  constexpr std::string_view expected = "three numbers x,y,z in m/s^2, such as 0,0,-9.81";
+  std::array<double, 3> gravity{};
+  std::size_t begin = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t end = k < 2 ? text.find(',', begin) : text.size();
+    double value = 0;
+    const auto [rest, error] = std::from_chars(text.data() + begin, text.data() + std::min(end, text.size()), value);
+    if (end == text.npos || error != std::errc{} || rest != text.data() + end) {
+      throw InputError(fmt::format("--gravity \"{}\": expected {}", text, expected));
+    }
+    gravity[k] = value;
+    begin = end + 1;
+  }
+  return gravity;
+}
+
+void read_model_options(const Texts& texts, std::optional<Base>& base, Options& options) {
+  if (!texts.base.empty()) base = base_from(texts.base);
+  if (!texts.gravity.empty()) options.gravity = gravity_from(texts.gravity);
+  if (!texts.solver.empty()) options.solver = solver_from(texts.solver);
+}
+
+void read_run_options(const Texts& texts, RunArguments& run) {
+  read_model_options(texts, run.base, run.options);
+  if (!texts.duration.empty()) run.duration = number_from("--duration", texts.duration, "seconds, such as 10");
+  if (!texts.dt.empty()) run.options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
+  if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
+  if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
+  if (!texts.tolerance.empty()) run.options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
+  if (!texts.order.empty() && texts.order != "2") throw InputError(fmt::format("--order {}: only order 2 exists", texts.order));
+  if (!texts.seed.empty()) {
+    const std::int64_t seed = integer_from("--seed", texts.seed, "a whole number, zero or more");
+    if (seed < 0) throw InputError(fmt::format("--seed {}: expected a whole number, zero or more", seed));
+    run.seed = static_cast<std::uint64_t>(seed);
+  }
+  if (!texts.spread.empty()) run.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
+}
+
+constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N";
+
+CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
+  CLI::App* command = program.add_subcommand("run", "Simulate one model.");
+  command->add_option("MODEL", run.model, kModelHelp)->required()->option_text(" ");
+  const auto add = [&](const char* group, const char* name, std::string& text, const char* value, const char* meaning) {
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
+  };
+  add("Motion", "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
+  add("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10");
+  add("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3");
+  add("Motion", "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
+  add("Start", "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  add("Start", "--load", run.load, "FILE", "continue from a checkpoint");
+  add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
+  add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
+  add("Method", "--stop", texts.stop, "NAME", "energy (default: relative) or absolute (|r| in N m s)");
+  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10");
+  add("Method", "--order", texts.order, "N", "of the integrator; 2");
+  add("Output", "--record", run.record, "FILE.csv", "time, energy and all coordinates, one row a step");
+  add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
+  add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");
+  add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
+  command->footer(
+      "Coordinates are named after their joints; quaternions are x y z w. Ctrl-C ends a run early and keeps its files.\n\n"
+      "Examples:\n"
+      "  linden run models/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --plot energy.png\n"
+      "  linden run chain:100 --duration 5 --dt 1e-3 --record chain.csv --json chain.json");
+  return command;
+}
+
+CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
+  CLI::App* command = program.add_subcommand("inspect", "Print a model: bodies, coordinates, masses, sweeps of a step.");
+  command->add_option("MODEL", inspect.model, kModelHelp)->required()->option_text(" ");
+  const auto add = [&](const char* name, std::string& text, const char* value, const char* meaning) {
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value");
+  };
+  add("--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
+  add("--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  add("--solver", texts.solver, "NAME", "newton (default) or riqn");
+  command->add_flag("--all", inspect.all, "long tables whole, not their first 20 rows");
+  add("--json", inspect.json, "FILE.json", "the same for scripts");
+  command->footer("Example:\n  linden inspect models/humanoid.urdf --base floating");
+  return command;
+}
+
+/// At most one empty line in a row.
+std::string with_single_gaps(std::string text) {
+  for (std::size_t at = 0; (at = text.find("\n\n\n", at)) != text.npos;) text.erase(at, 1);
+  return text;
+}
+
+/// What CLI11 could not place: most often a slip in an option's name.
+void refuse_leftovers(const CLI::App& app, const std::string& command) {
+  const std::vector<std::string> extras = app.remaining();
+  if (extras.empty()) return;
+  const auto option = std::ranges::find_if(extras, [](const std::string& text) { return text.starts_with('-'); });
+  std::vector<std::string> known;
+  if (option == extras.end()) {
+    for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) known.push_back(sub->get_name());
+  } else {
+    for (const CLI::Option* entry : app.get_options()) {
+      for (const std::string& name : entry->get_lnames()) known.push_back("--" + name);
+    }
+  }
+  const std::string word = option == extras.end() ? extras.front() : option->substr(0, option->find('='));
+  const std::string guess = nearest(word, known);
+  const char* what = option != extras.end() ? "unknown option" : known.empty() ? "unexpected argument" : "unknown command";
+  throw InputError(fmt::format("{} {}; {}", what, word,
+                               guess.empty() ? fmt::format("{} --help lists what there is", command)
+                                             : fmt::format("did you mean {}?", guess)));
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App program("Simulates trees of rigid bodies with a variational integrator, in time linear in their number.", "linden");
+  program.set_version_flag("--version", fmt::format("linden {}", kVersion));
+  program.footer("Examples:\n"
+                 "  linden run chain:100 --duration 5 --plot energy.png\n"
+                 "  linden inspect models/humanoid.urdf --base floating\n\n"
+                 "linden COMMAND --help says more.");
+  program.get_formatter()->column_width(30);
+  Texts texts;
+  RunArguments run_arguments;
+  InspectArguments inspect_arguments;
+  const CLI::App* run = add_run(program, texts, run_arguments);
+  const CLI::App* inspection = add_inspect(program, texts, inspect_arguments);
+  program.allow_extras();
+  for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->allow_extras();
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    fmt::print("{}", with_single_gaps(program.help()));
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);  // --version
+    std::string help = "linden";
+    for (const CLI::App* command : {run, inspection}) {
+      if (!command->parsed()) continue;
+      help = "linden " + command->get_name();
+      refuse_leftovers(*command, help);
+    }
+    throw InputError(fmt::format("{}; {} --help says more", error.what(), help));
+  }
+  refuse_leftovers(program, "linden");
+  if (run->parsed()) {
+    refuse_leftovers(*run, "linden run");
+    read_run_options(texts, run_arguments);
+    return run_command(run_arguments);
+  }
+  if (inspection->parsed()) {
+    refuse_leftovers(*inspection, "linden inspect");
+    read_model_options(texts, inspect_arguments.base, inspect_arguments.options);
+    return inspect(inspect_arguments);
+  }
+  throw InputError("no command given; choose run or inspect; linden --help says more");
+}
+
+int complain(std::string_view message, int exit_code) {
+  fmt::print(stderr, "linden: {}\n", printable(message));
+  return exit_code;
+}
+
+}  // namespace
+}  // namespace linden
+
+int main(int argc, char** argv) {
+  using linden::complain;
+  try {
+    return linden::run_program(argc, argv);
+  } catch (const linden::InputError& error) {
+    return complain(error.what(), 2);
+  } catch (const std::bad_alloc&) {
+    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
+  } catch (const std::length_error&) {
+    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
+  } catch (const std::exception& error) {
+    return complain(error.what(), 1);
+  }
+}

@@ -1,0 +1,54 @@
+// engine/options.hpp
+// How a simulation steps: method, tolerance, gravity. Everything has a sensible default.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+
+namespace linden {
+
+/// How the discrete Euler-Lagrange equation is solved.
+enum class Solver {
+  newton,  // exact Jacobian, O(n): about two iterations a step whatever the length of the tree
+  riqn,    // the paper's quasi-Newton (25): h M(q^k)^-1 for the inverse Jacobian
+};
+
+/// What the solve starts from (paper, 3.3).
+enum class FirstGuess {
+  extrapolation,  // polynomial through the displacements of the last steps
+  ig1,            // no displacement
+  ig2,            // the displacement of the last step
+  ig3,            // explicit acceleration, semi-implicit Euler
+};
+
+/// When the solve has converged.
+enum class StopTest {
+  energy,    // sqrt(1/2 r.M^-1 r) < tolerance sqrt(kinetic energy): the same meaning for a finger and for a crane
+  absolute,  // |r| < tolerance [N m s, N s], the paper's
+};
+
+struct Options {
+  double step = 1e-3;                           // h [s]
+  std::array<double, 3> gravity{0, 0, -9.81};   // [m/s^2]; zero: the scene has none and nothing is computed for it
+  Solver solver = Solver::newton;
+  FirstGuess guess = FirstGuess::extrapolation;
+  StopTest stop = StopTest::energy;
+  double tolerance = 1e-10;
+  int max_iterations = 0;  // corrections in one solve; 0: 50 for newton, 1,000 for riqn
+  int max_splits = 8;      // a step that fails is split in two this many times over: down to h / 256
+};
+
+std::string_view name(Solver solver);
+std::string_view name(FirstGuess guess);
+std::string_view name(StopTest stop);
+
+/// Throw InputError naming the choices where `text` is none of them.
+Solver solver_from(const std::string& text);
+FirstGuess guess_from(const std::string& text);
+StopTest stop_from(const std::string& text);
+
+/// Throws InputError where a value makes no sense: a step that is not positive and finite, a tolerance below zero, ...
+void check(const Options& options);
+
+}  // namespace linden

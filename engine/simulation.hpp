@@ -1,0 +1,81 @@
+// engine/simulation.hpp
+// One instance of a model in time: state, step, energy, momentum, checkpoint.
+//
+//   Simulation simulation(load_urdf("models/humanoid.urdf", Base::floating), {.step = 1e-3});
+//   simulation.set_positions(q);  simulation.set_velocities(v);
+//   const StepReport report = simulation.step();
+//   if (!report.ok()) ... simulation.describe(report) ...
+//
+// Positions are [nq], velocities and momenta [nv]; which row is which joint says model().names. Quaternions are x y z w. The
+// velocity of a ball joint is its angular velocity in the body's frame; of a free joint angular then linear, in the body's frame.
+#pragma once
+
+#include <iosfwd>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/stepper.hpp"
+
+namespace linden {
+
+struct Energy {
+  double kinetic = 0;    // 1/2 p.M^-1 p [J]
+  double potential = 0;  // of gravity [J]; zero where the centre of mass is at the height of the world's origin
+  double total() const { return kinetic + potential; }
+};
+
+/// Of the whole system, about the world's origin and in the world's frame.
+struct Momentum {
+  std::array<double, 3> angular{};  // [kg m^2/s]
+  std::array<double, 3> linear{};   // [kg m/s]
+};
+
+class Simulation {
+ public:
+  /// At rest in the model's zero configuration. Throws InputError for options that make no sense.
+  explicit Simulation(Model model, const Options& options = {});
+  explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {});
+
+  const Model& model() const { return *model_; }
+  const Options& options() const { return options_; }
+  double time() const { return static_cast<double>(steps_) * options_.step; }
+  std::int64_t steps() const { return steps_; }
+
+  std::span<const double> positions() const { return state_.q.flat(); }
+  std::span<const double> momenta() const { return state_.p.flat(); }
+  /// v = M(q)^-1 p: one O(n) solve.
+  std::vector<double> velocities();
+
+  /// Throw InputError for a wrong count or a number that is not finite. Quaternions are normalised; mimic joints follow their
+  /// leaders whatever is given for them. set_positions keeps the velocities, not the momenta.
+  void set_positions(std::span<const double> q);
+  void set_velocities(std::span<const double> v);
+
+  /// One step. A report that is not ok() leaves the state as it was before.
+  StepReport step();
+  std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
+
+  Energy energy();
+  Momentum momentum();
+
+  /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step
+  /// or gravity, a file that is cut short or is no checkpoint; the simulation is then unchanged.
+  void save(const std::string& file) const;
+  void load(const std::string& file);
+
+ private:
+  void check_row_count(const char* what, std::size_t found, Index expected) const;
+  void changed();
+
+  std::shared_ptr<const Model> model_;
+  Options options_;
+  State<double> state_;
+  Stepper stepper_;
+  Field<double> rate_;
+  std::int64_t steps_ = 0;
+  int history_ = 0;
+};
+
+}  // namespace linden

@@ -1,0 +1,29 @@
+#include "engine/step_report.hpp"
+
+#include <fmt/format.h>
+
+namespace linden {
+
+std::string describe(const StepReport& report, const Model& model, double step) {
+  if (report.ok()) return {};
+  const auto slot = static_cast<std::size_t>(report.slot);
+  const std::string where = fmt::format("body \"{}\" (joint \"{}\")", model.names.body[slot], model.names.joint[slot]);
+  const std::string advice = fmt::format("try a step below {:.3g} s", step / 4);
+  switch (report.status) {
+    case StepStatus::past_pi:
+      return fmt::format("{} turns by half a turn or more within a step of {:.3g} s, even split: {}", where, step, advice);
+    case StepStatus::gains_energy:
+      return fmt::format("a step of {:.3g} s is too large for this motion, even split: its solution gains energy that no force gives, "
+                         "most of it at {}; {}",
+                         step, where, advice);
+    case StepStatus::not_finite:
+      return fmt::format("the residual is not finite at {}, step {:.3g} s: look for a joint that moves no mass in this pose, for "
+                         "speeds beyond reason, or {}",
+                         where, step, advice);
+    default:
+      return fmt::format("the step of {:.3g} s did not converge: relative residual {:.2e} after {} iterations, largest at {}; {}",
+                         step, report.residual, report.iterations, where, advice);
+  }
+}
+
+}  // namespace linden

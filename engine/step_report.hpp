@@ -1,0 +1,37 @@
+// engine/step_report.hpp
+// What a step tells its caller: how the solve went, and where it failed.
+#pragma once
+
+#include <string>
+
+#include "layout/model.hpp"
+
+namespace linden {
+
+enum class StepStatus {
+  converged,
+  not_converged,  // the residual would not go below the tolerance
+  past_pi,        // a body turns by half a turn or more in one step, which the log map cannot represent
+  gains_energy,   // the solution found is not the motion's: a second root, met where the step is far too large
+  not_finite,     // a residual that is NaN or infinite: a singular joint or an overflow
+};
+
+struct StepReport {
+  StepStatus status = StepStatus::converged;
+  int iterations = 0;      // corrections of the displacement (linear solves), over all sub-steps
+  int evaluations = 0;     // of the residual
+  int factorisations = 0;  // of the Jacobian
+  int backtracks = 0;      // corrections cut short
+  int substeps = 1;        // above 1: the step failed whole and was split
+  bool at_rounding_floor = false;  // stopped above the tolerance, where rounding lets the residual fall no further
+  double residual = 0;      // sqrt(1/2 r.M^-1 r / kinetic energy) at the end, the largest over sub-steps
+  double residual_norm = 0; // |r| [N m s, N s], likewise
+  Index slot = 0;           // where it failed: the body that turns too far or the joint with the largest residual; 0 = fine
+
+  bool ok() const { return status == StepStatus::converged; }
+};
+
+/// One sentence: what failed, at which body and joint, by how much, and what to do. Empty for a step that converged.
+std::string describe(const StepReport& report, const Model& model, double step);
+
+}  // namespace linden

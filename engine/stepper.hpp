@@ -1,0 +1,92 @@
+// engine/stepper.hpp
+// The one-step map (q, p) -> (q, p): solve the discrete Euler-Lagrange equation for the displacement, then read off the new momentum.
+//
+//   momentum_target     h (p + h/2 Q)
+//   first guess         delta
+//   +-> motion_map      M = exp(S delta)
+//   |   displacement_down, momentum_map, residual_up            DRNEA: h r(delta)
+//   |   newton_factor_up (once a step) or articulated_inertia_up (riqn)
+//   |   impulse_pass_up                                         energy norm of r: converged?
+//   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
+//   advance_map, placement_map, gravity, end_momentum_map, impulse_up, momentum_update_map
+//
+// The equation may have other roots, far from the motion, once a step is too large for it. Whoever lands on one gains energy out of
+// nothing: kinetic energy of the mean motion minus the work of the forces is compared with the step before.
+//
+// Symplectic, time-symmetric, second order; no allocation. A solve that makes no progress is backtracked, then given a fresh exact
+// Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
+#pragma once
+
+#include "engine/options.hpp"
+#include "engine/step_report.hpp"
+#include "kernels/articulated.hpp"
+#include "kernels/mimic.hpp"
+#include "layout/state.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+
+class Stepper {
+ public:
+  Stepper(const Model& model, const Options& options);
+
+  /// Brings placements and forces to the positions in `state`; call after any change of them from outside.
+  void refresh(const State<double>& state);
+
+  /// One step of `h` seconds. `history`: how many rows of state.history are valid; updated.
+  StepReport step(State<double>& state, int& history, double h);
+
+  /// v = M(q)^-1 p, for the positions of the last refresh or step.
+  void velocity_of(const Field<double>& p, Field<double>& v);
+  /// p = M(q) v.
+  void momentum_of(const Field<double>& v, Field<double>& p);
+  /// Momentum of the whole system about the world's origin, in the world's frame, for rates v.
+  Wrench<double> total_momentum(const Field<double>& v);
+  double potential() const { return potential_; }
+
+  const Workspace<double>& workspace() const { return work_; }
+
+ private:
+  struct Evaluation {
+    double least_w;    // see displacement_down
+    double energy;     // h^2 x kinetic energy of the mean motion
+    double plain;      // |h r|^2
+    bool usable() const;
+  };
+
+  void first_guess(const State<double>& state, int history, double h);
+  Evaluation evaluate(StepReport& report);
+  void factor(StepReport& report);
+  void factor_mass();
+  double pass_up();
+  void pass_down();
+  void correct(double factor);
+  bool converged(const Evaluation& now, double norm, double h) const;
+  bool gains_energy(const State<double>& state, double h);
+  double work(const Field<double>& force) const;
+  bool at_rounding_floor(const Evaluation& now, double norm, double h) const;
+  Index worst_displacement() const;
+  Index largest_residual() const;
+  Index fastest_body() const;
+  StepStatus solve(const State<double>& state, int history, double h, StepReport& report);
+  StepStatus find_root(const State<double>& state, int history, double h, StepReport& report);
+  bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
+  void finish(State<double>& state, int& history, double h);
+  void forces();
+  void apply_mass_inverse(const Field<double>& p, Field<double>& v);
+  Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+
+  const Model& model_;
+  Options options_;
+  int max_iterations_;
+  bool gravity_;
+  double potential_ = 0;
+  double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
+  double kinetic_ = 0;          // the same in J
+  double failed_residual_ = 0;  // of the last solve that failed
+  Workspace<double> work_;
+  MimicTies<double> ties_;
+  State<double> last_good_;
+};
+
+}  // namespace linden

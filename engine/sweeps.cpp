@@ -1,0 +1,56 @@
+#include "engine/sweeps.hpp"
+
+#include <algorithm>
+
+namespace linden {
+
+std::vector<Sweep> sweeps_of(const Model& model, const Options& options) {
+  const bool gravity = options.gravity != std::array<double, 3>{0, 0, 0};
+  const bool newton = options.solver == Solver::newton;
+  const bool ties = !model.mimics.empty();
+  const bool quaternions = std::ranges::any_of(model.tree.runs, [](const Run& run) { return run.kind != JointKind::screw; });
+  std::vector<Sweep> list;
+  const auto add = [&](bool present, const Sweep& sweep) {
+    if (present) list.push_back(sweep);
+  };
+
+  constexpr std::string_view first = "first", evaluation = "evaluation", once = "once a step", correction = "correction", last = "last";
+  add(true, {first, "momentum_target_map", "p, force", "momentum_target"});
+  switch (options.guess) {
+    case FirstGuess::extrapolation: add(true, {first, "first guess: extrapolation", "history", "delta"}); break;
+    case FirstGuess::ig1: add(true, {first, "first guess: ig1", "", "delta"}); break;
+    case FirstGuess::ig2: add(true, {first, "first guess: ig2", "history", "delta"}); break;
+    case FirstGuess::ig3:
+      add(true, {first, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
+      add(true, {first, "impulse_pass_up, rate_down", "placement, gains, p", "delta (velocity)"});
+      add(true, {first, "velocity_down, coriolis_down", "inertia, screw, placement, delta", "twist, body_momentum, impulse"});
+      add(true, {first, "impulse_up", "screw, placement, impulse", "residual (acceleration's force)"});
+      add(true, {first, "impulse_pass_up, rate_down", "placement, gains, residual", "delta"});
+      break;
+  }
+  add(true, {first, "motion_map", "screw, delta", "motion"});
+  add(true, {evaluation, "displacement_down", "placement, motion", "displacement"});
+  add(true, {evaluation, "momentum_map", "inertia, displacement", "twist, body_momentum, impulse"});
+  add(true, {evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual"});
+  add(ties, {evaluation, "fold_mimics", "residual", "residual"});
+  add(newton, {once, "newton_factor_up", "inertia, screw, placement, motion, twist, body_momentum", "articulated, gains"});
+  add(!newton, {once, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
+  add(ties, {once, "ties: a tree solve for each mimic", "gains", "ties"});
+  add(true, {evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation"});
+  add(newton, {correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment"});
+  add(!newton, {correction, "rate_down", "screw, placement, gains, innovation", "variation, increment"});
+  add(ties, {correction, "ties: completion", "increment, ties", "increment"});
+  add(true, {correction, "correct_motion_map", "screw, increment", "delta, motion"});
+  add(quaternions, {last, "displacement_map", "motion", "delta"});
+  add(true, {last, "advance_map", "motion, delta", "q, history"});
+  add(true, {last, "end_momentum_map", "twist, body_momentum", "impulse"});
+  add(true, {last, "placement_map", "tree_placement, screw, q", "placement"});
+  add(gravity, {last, "gravity_field_down", "placement", "field"});
+  add(gravity, {last, "gravity_force_up", "inertia, subtree_mass, screw, placement, field", "first_moment, force"});
+  add(true, {last, "impulse_up", "screw, placement, impulse", "impulse, increment"});
+  add(true, {last, "momentum_update_map", "displacement, increment, residual, force", "p"});
+  add(ties, {last, "fold_mimics", "p", "p"});
+  return list;
+}
+
+}  // namespace linden

@@ -1,0 +1,35 @@
+// kernels/articulated_inertia_up.hpp
+// Factor of the mass matrix M(q): articulated-body inertias, leaves to root.
+//
+//   A_i = G_i + sum over children c of Ad_{X_c^-1}^T (A_c - U_c d_c^-1 U_c^T) Ad_{X_c^-1},   U = A S,  d = S^T U
+//
+// With impulse_pass_up and rate_down it applies M^-1 in O(n): the velocity of a momentum, and (times h) the inverse Jacobian of RIQN.
+//
+// reads   inertia 10 x n, screw 2 x n, placement 12 x n
+// writes  articulated 36 x n (A), gains
+// cost    one pass, one division a screw; the bodies of one level are independent but for the sum into their parents
+// source  Featherstone, Rigid Body Dynamics Algorithms, 7.3 (ABI); the paper, 3.2
+#pragma once
+
+#include "kernels/articulated.hpp"
+
+namespace linden {
+
+template <class S, class Element>
+void articulated_inertia_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
+                            Field<S, 36>& articulated, const Gains<S>& gains) {
+  for (Index i = 0; i < tree.shape.slots; ++i) {
+    const auto G = load<Inertia, S>(constants.inertia, i);
+    const Mat3<S> C = hat(G.mc);
+    store(articulated, i, Mat6<S>{G.rotational(), C, transpose(C), diagonal(G.m)});
+  }
+  up(tree, [&](auto joint, Index i) {
+    const Mat6<S> felt = eliminate_joint(joint, tree, constants, i, load<Mat6, S>(articulated, i), gains);
+    if constexpr (joint != JointKind::free) {
+      const Index parent = tree.parent(i);
+      store(articulated, parent, load<Mat6, S>(articulated, parent) + to_parent(load<Placement, S>(placement, i), felt));
+    }
+  });
+}
+
+}  // namespace linden

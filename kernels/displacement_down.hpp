@@ -1,0 +1,54 @@
+// kernels/displacement_down.hpp
+// How far every body moves in the step, root to leaves.
+//
+//   dT_i = X_i^-1 dT_lambda(i) X_i  M_i        (19) in displacement form
+//
+// Nothing is formed as (something near I) minus I: dT is a quaternion near identity and a shift, so log dT keeps its relative
+// accuracy however small the step. With dT_lambda = (w, v; p) and X = (R, s)
+//
+//   X^-1 dT_lambda X = (w, R^T v;  R^T (p + 2 v x (w s + v x s)))
+//
+// reads   placement 12 x n at q^k, motion 7 x n
+// writes  displacement 7 x n (quaternion x y z w, shift [m]; body frame)
+// returns the least w of any body: where it is not positive a body turned by pi or more, which log cannot represent
+// cost    one pass; the bodies of one level are independent
+// source  the paper, (19)
+#pragma once
+
+#include <algorithm>
+
+#include "kernels/joints.hpp"
+
+namespace linden {
+
+template <class S>
+S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field<S, 7>& motion, Field<S, 7>& displacement) {
+  using std::min;
+  const S zero(0.0), one(1.0);
+  store(displacement, 0, Displacement<S>{{{zero, zero, zero}, one}, {zero, zero, zero}});
+  S least = one;
+  down(tree, [&](auto joint, Index i) {
+    const auto parent = load<Displacement, S>(displacement, tree.parent(i));
+    const auto X = load<Placement, S>(placement, i);
+    const auto M = load<Displacement, S>(motion, i);
+    const Vec3<S>& v = parent.r.v;
+    const Vec3<S> shift = parent.p + S(2.0) * cross(v, parent.r.w * X.p + cross(v, X.p));
+    const Displacement<S> carried{{transpose_times(X.R, v), parent.r.w}, transpose_times(X.R, shift)};
+    Displacement<S> moved;
+    if constexpr (joint == JointKind::screw) {
+      // M turns about z and shifts along z
+      const S c = M.r.w, s = M.r.v.z, w = carried.r.w;
+      const Vec3<S>& u = carried.r.v;
+      moved.r = {{u.x * c + u.y * s, u.y * c - u.x * s, u.z * c + w * s}, w * c - u.z * s};
+      const Vec3<S> axis{S(2.0) * (u.x * u.z + w * u.y), S(2.0) * (u.y * u.z - w * u.x), one - S(2.0) * (u.x * u.x + u.y * u.y)};
+      moved.p = carried.p + M.p.z * axis;
+    } else {
+      moved = carried * M;
+    }
+    store(displacement, i, moved);
+    least = min(least, min(moved.r.w, M.r.w));
+  });
+  return least;
+}
+
+}  // namespace linden

@@ -1,0 +1,112 @@
+// kernels/joints.hpp
+// The three joint kinds as compile-time tags, the loop over runs, and what a joint does to twists and wrenches.
+//
+// A sweep hands `down` or `up` a body of code that is compiled once a kind; within a run it loops without a branch. Parents precede
+// children, so `down` meets every parent before its children and `up` every child before its parent.
+//
+//            S                       S^T F                 S a
+//   screw    (0 0 r; 0 0 t)          r n_z + t f_z         one number
+//   ball     (1; 0)                  n                     three
+//   free     (1 0; 0 1)              n, f                  six
+#pragma once
+
+#include <type_traits>
+
+#include "kernels/spatial.hpp"
+#include "layout/body_constants.hpp"
+#include "layout/tree.hpp"
+
+namespace linden {
+
+template <JointKind Kind>
+using Joint = std::integral_constant<JointKind, Kind>;
+
+template <class Body>
+void with_joint(JointKind kind, Body&& body) {
+  switch (kind) {
+    case JointKind::screw: return body(Joint<JointKind::screw>{});
+    case JointKind::ball: return body(Joint<JointKind::ball>{});
+    case JointKind::free: return body(Joint<JointKind::free>{});
+  }
+}
+
+/// body(joint, i) for every slot but the world, root to leaves.
+template <class Body>
+void down(const Tree& tree, Body&& body) {
+  for (const Run& run : tree.runs) {
+    with_joint(run.kind, [&](auto joint) {
+      for (Index i = run.begin; i < run.end; ++i) body(joint, i);
+    });
+  }
+}
+
+/// body(joint, i) for every slot but the world, leaves to root.
+template <class Body>
+void up(const Tree& tree, Body&& body) {
+  for (auto run = tree.runs.rbegin(); run != tree.runs.rend(); ++run) {
+    with_joint(run->kind, [&](auto joint) {
+      for (Index i = run->end - 1; i >= run->begin; --i) body(joint, i);
+    });
+  }
+}
+
+/// r and t of a screw joint.
+template <class S>
+struct Screw {
+  S r, t;
+};
+
+template <class S, class Element>
+LINDEN_INLINE Screw<S> load_screw(const BodyConstants<Element>& constants, Index i) {
+  return {as<S>(constants.screw(i, 0)), as<S>(constants.screw(i, 1))};
+}
+
+/// V + S a, a = rates of the joint from row first_v on.
+template <JointKind Kind, class S, class Element>
+LINDEN_INLINE Twist<S> add_motion(Joint<Kind>, const BodyConstants<Element>& constants, Index i, Index row, const Field<S>& a, Twist<S> V) {
+  if constexpr (Kind == JointKind::screw) {
+    const Screw<S> screw = load_screw<S>(constants, i);
+    V.w.z = V.w.z + screw.r * a(row);
+    V.v.z = V.v.z + screw.t * a(row);
+  } else {
+    V.w += load3<S>(a, row);
+    if constexpr (Kind == JointKind::free) V.v += load3<S>(a, row + 3);
+  }
+  return V;
+}
+
+/// S^T F as a wrench-sized value of which the first nv numbers count: a screw's one number is in n.x.
+template <JointKind Kind, class S, class Element>
+LINDEN_INLINE Wrench<S> project(Joint<Kind>, const BodyConstants<Element>& constants, Index i, const Wrench<S>& F) {
+  if constexpr (Kind == JointKind::screw) {
+    const Screw<S> screw = load_screw<S>(constants, i);
+    return {{screw.r * F.n.z + screw.t * F.f.z, S(0.0), S(0.0)}, {S(0.0), S(0.0), S(0.0)}};
+  } else {
+    return F;
+  }
+}
+
+/// The first nv numbers of `value` to or from rows row, row + 1, ...
+template <JointKind Kind, class S>
+LINDEN_INLINE void store_joint(Joint<Kind>, Field<S>& field, Index row, const Wrench<S>& value) {
+  if constexpr (Kind == JointKind::screw) {
+    field(row) = value.n.x;
+  } else {
+    store3(field, row, value.n);
+    if constexpr (Kind == JointKind::free) store3(field, row + 3, value.f);
+  }
+}
+
+template <JointKind Kind, class S>
+LINDEN_INLINE Wrench<S> load_joint(Joint<Kind>, const Field<S>& field, Index row) {
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  if constexpr (Kind == JointKind::screw) {
+    return {{field(row), S(0.0), S(0.0)}, zero};
+  } else if constexpr (Kind == JointKind::ball) {
+    return {load3<S>(field, row), zero};
+  } else {
+    return {load3<S>(field, row), load3<S>(field, row + 3)};
+  }
+}
+
+}  // namespace linden

@@ -1,0 +1,33 @@
+// layout/model.hpp
+// A tree ready to be simulated: topology, constants, names. Immutable once built; shared by any number of simulations.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "layout/attributes.hpp"
+#include "layout/body_constants.hpp"
+#include "layout/names.hpp"
+#include "layout/tree.hpp"
+
+namespace linden {
+
+struct Model {
+  Tree tree;
+  BodyConstants<double> constants;
+  Attributes attributes;
+  std::vector<Mimic> mimics;
+  Names names;
+  std::vector<std::string> warnings;  // what the source said that was read with a grain of salt
+
+  /// Free coordinates: velocities less the mimic joints.
+  Index degrees_of_freedom() const { return tree.shape.velocities - static_cast<Index>(mimics.size()); }
+
+  /// Zero configuration [nq]: zeros, identity quaternions, mimic joints at their offsets.
+  std::vector<double> neutral() const;
+
+  /// Hash of everything the motion depends on (topology, constants, mimics): a checkpoint belongs to one hash.
+  std::uint64_t hash() const;
+};
+
+}  // namespace linden

@@ -1,0 +1,38 @@
+// layout/urdf.hpp
+// From a URDF file to a model: the dialect that real robots are written in.
+//
+//   URDF                                    LinkSpec (layout/builder.hpp)
+//   revolute, continuous                    revolute; continuous joints have no position limits
+//   prismatic, fixed, planar                the same; the normal of the plane is the axis
+//   floating                                free
+//   inertial at any origin, turned          turned into the link's axes
+//   link without inertial                   massless
+//   limit, dynamics, mimic                  limits, damping and friction, mimic
+//   shapes, sensors, all else               not read
+//
+// A tree has one root link. With Base::fixed it is fixed to the world. With Base::floating a free joint called "base"
+// carries it, unless the file itself lets its robot float: where the root, with all that is fixed to it, has no mass
+// and carries floating joints only, it is the world. A floating joint of the file is honoured with either base.
+//
+// Slots of one level and kind keep the order of the file's <joint> elements where their parents do. Files are checked
+// before urdfdom sees them (layout/urdf_check.hpp); what was read with a grain of salt is in Model::warnings.
+//
+// source  http://wiki.ros.org/urdf/XML; the reading itself is urdfdom's
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "layout/builder.hpp"
+
+namespace linden {
+
+enum class Base : std::uint8_t { fixed, floating };
+
+/// Reads a URDF file. Throws InputError: `file:line: what was found; what was expected; what to do`.
+Model load_urdf(const std::string& file, Base base = Base::fixed);
+
+/// The same from memory; `source_name` stands for the file in messages. Threads may call both at once.
+Model parse_urdf(const std::string& xml, const std::string& source_name, Base base = Base::fixed);
+
+}  // namespace linden

@@ -1,0 +1,52 @@
+// layout/workspace.hpp
+// Scratch of one thread: what the sweeps of a step hand to each other. Nothing in it outlives a step, so a thread needs one
+// workspace however many instances it steps. All impulses are carried times h (see kernels/momentum_map.hpp).
+#pragma once
+
+#include "layout/field.hpp"
+
+namespace linden {
+
+#define LINDEN_WORKSPACE_FIELDS(FIELD)                                                                                 \
+  FIELD(Scalar, placement, 12, slots, "X: child -> parent at q; rotation row by row, shift [m]")                       \
+  FIELD(Scalar, motion, 7, slots, "exp(S delta): the joint's own displacement; quaternion x y z w, shift [m]")         \
+  FIELD(Scalar, displacement, 7, slots, "dT = T(k)^-1 T(k+1); quaternion x y z w, shift [m], body frame")              \
+  FIELD(Scalar, twist, 6, slots, "h V = log dT: angular [rad], linear [m], body frame")                                \
+  FIELD(Scalar, body_momentum, 6, slots, "G h V: angular [kg m^2], linear [kg m]")                                     \
+  FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
+  FIELD(Scalar, articulated, 36, slots, "Pi (exact Newton) or articulated inertia: four 3 x 3 blocks, row by row")     \
+  FIELD(Scalar, gain_up, 6, velocities, "Pi S d^-1, one row a degree of freedom")                                      \
+  FIELD(Scalar, gain_down, 6, velocities, "(S^T Pi)^T d^-T, one row a degree of freedom")                              \
+  FIELD(Scalar, joint_inverse, 1, blocks, "d^-1, d = S^T Pi S, row by row")                                            \
+  FIELD(Scalar, bias, 6, slots, "b: impulse that reaches the parent when the joints yield")                            \
+  FIELD(Scalar, variation, 6, slots, "eta: change of the body's pose at k+1, body frame [rad, m]")                     \
+  FIELD(Scalar, residual, 1, velocities, "h r [kg m^2, kg m]")                                                         \
+  FIELD(Scalar, momentum_target, 1, velocities, "h (p + h/2 Q): what the residual is measured against")                \
+  FIELD(Scalar, innovation, 1, velocities, "u = r - S^T b")                                                            \
+  FIELD(Scalar, increment, 1, velocities, "Delta: the correction of the displacement [rad, m]")                        \
+  FIELD(Scalar, applied, 1, velocities, "the correction applied last [rad, m]")                                        \
+  FIELD(Scalar, delta, 1, velocities, "delta: displacement of the joints, first guess and then better [rad, m]")                     \
+  FIELD(Scalar, force, 1, velocities, "Q: generalized force of the potentials at q [N m, N]")                          \
+  FIELD(Scalar, field, 3, slots, "gravity in the body frame [m/s^2]")                                                  \
+  FIELD(Scalar, first_moment, 3, slots, "m c of the subtree, body frame [kg m]")
+
+template <class Scalar>
+struct Workspace {
+  LINDEN_FIELDS(LINDEN_WORKSPACE_FIELDS)
+};
+
+/// Fills every field of a structure with NaN.
+template <class Structure>
+void poison_all(Structure& structure) {
+  Structure::each(structure, [](const char*, auto& field, Rows, const char*) { poison(field); });
+}
+
+/// Bytes held by the fields of a structure.
+template <class Structure>
+std::size_t bytes(const Structure& structure) {
+  std::size_t total = 0;
+  Structure::each(structure, [&](const char*, const auto& field, Rows, const char*) { total += field.bytes(); });
+  return total;
+}
+
+}  // namespace linden

@@ -1,0 +1,166 @@
+#include "kernels/momentum_update_map.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "kernels/advance_map.hpp"
+#include "tests/kernels/rig.hpp"
+#include "tests/reference/discrete_action_plain.hpp"
+
+namespace linden {
+namespace {
+
+const auto target = make_kernel([](auto&) {},
+                                [](auto& rig) {
+                                  momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target);
+                                },
+                                {"momentum_target"});
+
+const auto update = make_kernel([](auto& rig) { find_residual(rig); },
+                                [](auto& rig) {
+                                  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.right_side, rig.work.residual,
+                                                      rig.work.force, rig.state.p);
+                                },
+                                {"p"});
+
+/// From a displacement to the momentum at its end, without forces; leaves q at the end of the step.
+void finish(Rig<double>& rig) {
+  fill(rig.work.force, VectorXd::Zero(rig.tree.shape.velocities));
+  find_residual(rig);
+  end_momentum_map(rig.tree, rig.work.twist, rig.work.body_momentum, rig.work.impulse);
+  advance_map(rig.tree, rig.work.motion, rig.work.delta, rig.state.q);
+  placement_map(rig.tree, rig.constants, rig.state.q, rig.work.placement);
+  impulse_up(rig.tree, rig.constants, rig.work.placement, rig.work.impulse, rig.work.increment);
+  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.work.increment, rig.work.residual, rig.work.force, rig.state.p);
+}
+
+TEST_CASE("the target is h (p + h/2 Q), and the update (projected - C r) / h + h/2 Q") {
+  double worst = 0;
+  for (const Model& model : mixed_trees()) {
+    const PlainTree tree = reference::plain_tree(model);
+    const Instance instance = random_instance(tree, 5, 1.0);
+    Rig<double> rig(model);
+    rig.set(instance);
+    const double h = rig.h;
+    target.run(rig);
+    const VectorXd expected = h * (instance.p + h / 2 * instance.force);
+    see(worst, relative_error(vector(rig.work.momentum_target), expected));
+
+    update.prepare(rig);
+    update.run(rig);
+    VectorXd p = instance.right_side;
+    const VectorXd residual = vector(rig.work.residual);
+    for (Index i = 1; i < tree.slots(); ++i) {
+      const PlainBody& body = tree.body(i);
+      if (body.kind == JointKind::screw) {
+        p[body.v] -= residual[body.v];
+        continue;
+      }
+      // the rows of S^T Ad_dT^T S: all of it for a free joint, the turn alone for a ball
+      const auto Ad = reference::adjoint<double>(row<Displacement>(rig.work.displacement, i));
+      p.segment(body.v, body.dofs()) -= body.S.transpose() * Ad.transpose() * body.S * residual.segment(body.v, body.dofs());
+    }
+    see(worst, relative_error(vector(rig.state.p), p / h + h / 2 * instance.force));
+  }
+  INFO("worst relative error: " << worst / kEpsilon << " epsilon");
+  CHECK(worst < 16 * kEpsilon);
+}
+
+TEST_CASE("the momentum at the end of a solved step is the derivative of the discrete action by its end") {
+  double worst = 0;
+  for (const Model& model : mixed_trees()) {
+    const PlainTree tree = reference::plain_tree(model);
+    for (const double turn : {1e-2, 0.5, 2.0, 2.8}) {
+      Instance instance = random_instance(tree, 5, turn);
+      const VectorXd next = reference::advanced(tree, instance.q, instance.delta);
+      const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+      Rig<double> rig(model);
+      // the momentum that makes this displacement the solution
+      const double h = rig.h;
+      instance.p = -reference::action_slope_at_begin(tree, instance.q, next, h, none);
+      rig.set(instance);
+      finish(rig);
+      CHECK(vector(rig.work.residual).norm() < 1e-12 * h * instance.p.norm());
+      see(worst, relative_error(vector(rig.state.p), reference::action_slope_at_end(tree, instance.q, next, h, none)));
+    }
+  }
+  INFO("worst relative error: " << worst);
+  CHECK(worst < 1e-12);
+}
+
+TEST_CASE("a free rigid body's momentum is carried on exactly by any displacement, solved for or not") {
+  const Model model = random_tree({.bodies = 1, .seed = 3, .screws = false, .balls = false});
+  const PlainTree tree = reference::plain_tree(model);
+  double worst = 0;
+  for (const double turn : {1e-3, 0.5, 2.0, 3.0}) {
+    const Instance instance = random_instance(tree, 6, turn);
+    Rig<double> rig(model);
+    rig.set(instance);
+    finish(rig);
+    CHECK(vector(rig.work.residual).norm() > 1e-3);
+    // p is given in the body's frame: at the end of the step it is seen from there
+    const VectorXd expected = reference::adjoint<double>(row<Displacement>(rig.work.displacement, 1)).transpose() * instance.p;
+    see(worst, relative_error(vector(rig.state.p), expected));
+  }
+  INFO("worst relative error: " << worst / kEpsilon << " epsilon");
+  CHECK(worst < 64 * kEpsilon);
+}
+
+/// Momentum about the world's origin: a free root's p feels the whole of its tree.
+reference::Vector6<double> root_momentum(const Rig<double>& rig) {
+  const auto X = row<Placement>(rig.work.placement, 1);
+  return reference::adjoint<double>(reference::inverse<double>(X)).transpose() * vector(rig.state.p).head<6>();
+}
+
+TEST_CASE("a free body's and a floating tree's momentum survive 1,000 steps that are barely solved") {
+  for (const Index bodies : {1, 5}) {
+    const Model model = random_tree({.bodies = bodies, .seed = 4, .frees = false, .floating = true});
+    const PlainTree tree = reference::plain_tree(model);
+    Rig<double> rig(model);
+    Instance instance = random_instance(tree, 6, 0.05);
+    const VectorXd next = reference::advanced(tree, instance.q, instance.delta);
+    instance.p = -reference::action_slope_at_begin(tree, instance.q, next, rig.h, Eigen::Vector3d::Zero());
+    instance.force.setZero();
+    rig.set(instance);
+    factor_mass(rig);
+    const reference::Vector6<double> before = root_momentum(rig);
+    double worst = 0, largest_residual = 0;
+    for (int step = 0; step < 1000; ++step) {
+      // one correction from a poor guess
+      momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target);
+      factor_mass(rig);
+      pass_up(rig, rig.work.momentum_target);
+      pass_down_mass(rig);
+      for (Index row = 0; row < tree.velocities; ++row) rig.work.delta(row) = 0.98 * rig.work.increment(row);
+      factor_newton(rig);
+      find_residual(rig);
+      pass_up(rig, rig.work.residual);
+      pass_down_newton(rig);
+      correct_motion_map(rig.tree, rig.constants, rig.work.increment, 1.0, rig.work.delta, rig.work.motion);
+      displacement_map(rig.tree, rig.work.motion, rig.work.delta);
+      finish(rig);
+      see(largest_residual, vector(rig.work.residual).norm() / vector(rig.work.momentum_target).norm());
+      see(worst, relative_error(root_momentum(rig), before));
+    }
+    INFO(bodies << " bodies: worst drift of momentum " << worst << ", largest relative residual " << largest_residual);
+    CHECK(largest_residual > 1e-7);
+    CHECK(worst < 1e-12);
+  }
+}
+
+TEST_CASE("the momentum maps at the ends of a step write all they are to write and nothing else") {
+  check_writes(target);
+  check_writes(update);
+}
+
+TEST_CASE("the momentum maps at the ends of a step allocate nothing") {
+  check_allocates_nothing(target);
+  check_allocates_nothing(update);
+}
+
+TEST_CASE("the momentum maps at the ends of a step give equal bits in every lane") {
+  check_lanes(target);
+  check_lanes(update);
+}
+
+}  // namespace
+}  // namespace linden

@@ -1,0 +1,310 @@
+// tests/kernels/rig.hpp
+// Everything a sweep needs, for any Scalar: a tree, its fields, random inputs; and the proofs that hold for every sweep alike.
+//
+//   const auto kernel = make_kernel(prepare, run, {fields it writes}, {fields it changes in place});
+//   check_writes(kernel)             started from NaN every number is written, and nothing else is touched
+//   check_allocates_nothing(kernel)
+//   check_lanes(kernel)              the same instance has the same bits in every lane and any company, and agrees with the plain path
+//
+// prepare(rig) and run(rig) are generic lambdas; a kernel's return value goes to rig.result.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "kernels/articulated_inertia_up.hpp"
+#include "kernels/displacement_down.hpp"
+#include "kernels/increment_down.hpp"
+#include "kernels/momentum_map.hpp"
+#include "kernels/momentum_update_map.hpp"
+#include "kernels/motion_map.hpp"
+#include "kernels/newton_factor_up.hpp"
+#include "kernels/placement_map.hpp"
+#include "kernels/residual_up.hpp"
+#include "layout/state.hpp"
+#include "layout/workspace.hpp"
+#include "models/generators.hpp"
+#include "tests/kernels/lanes.hpp"
+#include "tests/kernels/values.hpp"
+#include "tests/reference/plain_tree.hpp"
+
+namespace linden {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using reference::PlainBody;
+using reference::PlainTree;
+
+/// Random trees with joints of all kinds: deep, bushy, floating, with masses over six decades, and without free joints inside.
+std::vector<Model> mixed_trees();
+
+/// What one instance starts from.
+struct Instance {
+  VectorXd q, delta, p, rate, force, right_side;
+};
+
+/// A random instance whose step turns some body by `turn` [rad] and none by more.
+Instance random_instance(const PlainTree& tree, std::uint64_t seed, double turn);
+
+VectorXd random_vector(Random& random, Index size, double bound);
+
+/// Angle between two poses of a body, [0, pi].
+double turn_between(const reference::Matrix4<double>& a, const reference::Matrix4<double>& b);
+
+/// Largest turn of any body or joint in a step.
+double largest_turn(const PlainTree& tree, const VectorXd& q, const VectorXd& delta);
+
+/// A^-1 b by LU with pivoting.
+VectorXd dense_solve(const MatrixXd& A, const VectorXd& b);
+
+template <class S>
+struct Rig {
+  const Model& model;
+  const Tree& tree;
+  const BodyConstants<double>& constants;
+  State<S> state;
+  Workspace<S> work;
+  Field<S> rate, right_side, result;
+  S h = S(0.125);
+
+  explicit Rig(const Model& m) : model(m), tree(m.tree), constants(m.constants) {
+    state.allocate(tree.shape);
+    work.allocate(tree.shape);
+    rate.allocate(tree.shape.velocities);
+    right_side.allocate(tree.shape.velocities);
+    result.allocate(1);
+    each(*this, [](const char*, auto& field, Rows) { poison(field); });
+  }
+
+  void set(const Instance& instance, std::size_t at = 0) {
+    const auto copy = [&](const VectorXd& from, Field<S>& to) {
+      for (Index row = 0; row < to.rows(); ++row) set_lane(to(row), at, from[row]);
+    };
+    copy(instance.q, state.q);
+    copy(instance.p, state.p);
+    copy(instance.delta, work.delta);
+    copy(instance.force, work.force);
+    copy(instance.rate, rate);
+    copy(instance.right_side, right_side);
+  }
+
+  Gains<S> gains() { return {work.gain_up, work.gain_down, work.joint_inverse}; }
+
+  /// visit(name, field, rows) for every field.
+  template <class Self, class Visit>
+  static void each(Self& self, Visit&& visit) {
+    const auto named = [&](const char* name, auto& field, Rows rows, const char*) { visit(name, field, rows); };
+    State<S>::each(self.state, named);
+    Workspace<S>::each(self.work, named);
+    visit("rate", self.rate, Rows::velocities);
+    visit("right_side", self.right_side, Rows::velocities);
+    visit("result", self.result, Rows::blocks);
+  }
+};
+
+// The sweeps of a step, each from what those above it left.
+
+template <class S>
+void place(Rig<S>& rig) {
+  placement_map(rig.tree, rig.constants, rig.state.q, rig.work.placement);
+  motion_map(rig.tree, rig.constants, rig.work.delta, rig.work.motion);
+}
+
+template <class S>
+void displace(Rig<S>& rig) {
+  place(rig);
+  rig.result(0) = displacement_down(rig.tree, rig.work.placement, rig.work.motion, rig.work.displacement);
+}
+
+template <class S>
+void find_momenta(Rig<S>& rig) {
+  displace(rig);
+  momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist, rig.work.body_momentum, rig.work.impulse);
+}
+
+template <class S>
+void find_residual(Rig<S>& rig) {
+  find_momenta(rig);
+  momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target);
+  residual_up(rig.tree, rig.constants, rig.work.placement, rig.work.momentum_target, rig.work.impulse, rig.work.residual);
+}
+
+template <class S>
+void factor_newton(Rig<S>& rig) {
+  find_momenta(rig);
+  newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.twist, rig.work.body_momentum,
+                   rig.work.articulated, rig.gains());
+}
+
+template <class S>
+void factor_mass(Rig<S>& rig) {
+  place(rig);
+  articulated_inertia_up(rig.tree, rig.constants, rig.work.placement, rig.work.articulated, rig.gains());
+}
+
+template <class S>
+void pass_up(Rig<S>& rig, const Field<S>& right_side) {
+  rig.result(0) = impulse_pass_up(rig.tree, rig.constants, rig.work.placement, rig.gains(), right_side, rig.work.bias,
+                                  rig.work.innovation);
+}
+
+template <class S>
+void pass_down_newton(Rig<S>& rig) {
+  increment_down(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.gains(), rig.work.innovation,
+                 rig.work.variation, rig.work.increment);
+}
+
+template <class S>
+void pass_down_mass(Rig<S>& rig) {
+  rate_down(rig.tree, rig.constants, rig.work.placement, rig.gains(), rig.work.innovation, rig.work.variation,
+            rig.work.increment);
+}
+
+/// A field of one component as a vector, and back.
+inline VectorXd vector(const Field<double>& field) {
+  return Eigen::Map<const VectorXd>(field.flat().data(), static_cast<Eigen::Index>(field.flat().size()));
+}
+
+inline void fill(Field<double>& field, const VectorXd& values) { std::copy(values.begin(), values.end(), field.flat().begin()); }
+
+/// Row i of a field as an Eigen vector or matrix.
+template <template <class> class Value, int Components>
+auto row(const Field<double, Components>& field, Index i) {
+  return eigen(load<Value, double>(field, i));
+}
+
+template <class Prepare, class Run>
+struct Kernel {
+  Prepare prepare;
+  Run run;
+  std::vector<std::string> writes, changes;
+};
+
+template <class Prepare, class Run>
+Kernel<Prepare, Run> make_kernel(Prepare prepare, Run run, std::vector<std::string> writes, std::vector<std::string> changes = {}) {
+  return {prepare, run, std::move(writes), std::move(changes)};
+}
+
+inline bool contains(const std::vector<std::string>& names, std::string_view name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+template <class Prepare, class Run>
+void check_writes(const Kernel<Prepare, Run>& kernel) {
+  std::vector<std::string> changed;
+  for (const Model& model : mixed_trees()) {
+    Rig<double> rig(model);
+    rig.set(random_instance(reference::plain_tree(model), 5, 0.7));
+    kernel.prepare(rig);
+    Rig<double>::each(rig, [&](const char* name, auto& field, Rows) {
+      if (contains(kernel.writes, name)) poison(field);
+    });
+    Rig<double> before = rig;
+    kernel.run(rig);
+    std::vector<std::vector<double>> old;
+    Rig<double>::each(before, [&](const char*, auto& field, Rows) { old.emplace_back(field.flat().begin(), field.flat().end()); });
+    std::size_t at = 0, outputs = 0;
+    Rig<double>::each(rig, [&](const char* name, auto& field, Rows rows) {
+      const std::vector<double>& was = old[at++];
+      const std::size_t width = field.flat().size() / static_cast<std::size_t>(field.rows());
+      const bool output = contains(kernel.writes, name) || contains(kernel.changes, name);
+      outputs += output ? 1 : 0;
+      // row 0 of a field of slots is the world's: most maps leave it alone
+      const std::size_t begin = output && rows == Rows::slots ? width : 0;
+      bool complete = true, untouched = true;
+      for (std::size_t k = begin; k < was.size(); ++k) {
+        complete = complete && std::isfinite(field.flat()[k]);
+        untouched = untouched && same_bits(field.flat()[k], was[k]);
+      }
+      INFO(model.names.model << ": " << name);
+      if (output) {
+        CHECK(complete);
+        if (!untouched) changed.push_back(name);
+      } else {
+        CHECK(untouched);
+      }
+    });
+    CHECK(outputs == kernel.writes.size() + kernel.changes.size());
+  }
+  for (const std::string& name : kernel.changes) {
+    INFO(name);
+    CHECK(contains(changed, name));
+  }
+}
+
+template <class S, class Prepare, class Run>
+void check_allocates_nothing_as(const Kernel<Prepare, Run>& kernel) {
+  const Model model = random_tree({.bodies = 12, .seed = 11});
+  Rig<S> rig(model);
+  const PlainTree tree = reference::plain_tree(model);
+  for (std::size_t l = 0; l < lane_count<S>; ++l) rig.set(random_instance(tree, 5 + l, 0.7), l);
+  kernel.prepare(rig);
+  const AllocationCounter counter;
+  kernel.run(rig);
+  const std::int64_t allocations = counter.count();
+  CHECK(allocations == 0);
+}
+
+template <class Prepare, class Run>
+void check_allocates_nothing(const Kernel<Prepare, Run>& kernel) {
+  check_allocates_nothing_as<double>(kernel);
+  check_allocates_nothing_as<Pack>(kernel);
+}
+
+/// `tolerance`: difference to the plain path, in units of the largest number of a field.
+template <class Prepare, class Run>
+void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {
+  const Model models[] = {random_tree({.bodies = 9, .seed = 21}), random_tree({.bodies = 9, .seed = 22, .frees = false})};
+  for (const Model& model : models) {
+    const PlainTree tree = reference::plain_tree(model);
+    constexpr std::size_t count = 2 * Pack::size + 1;
+    std::vector<Instance> instances;
+    std::vector<std::vector<double>> plain, packed(count);
+    for (std::size_t k = 0; k < count; ++k) {
+      instances.push_back(random_instance(tree, 100 + k, k % 3 == 0 ? 2.0 : 0.1));
+      Rig<double> rig(model);
+      rig.set(instances[k]);
+      kernel.prepare(rig);
+      kernel.run(rig);
+      plain.emplace_back();
+      Rig<double>::each(rig, [&](const char*, auto& field, Rows) {
+        plain[k].insert(plain[k].end(), field.flat().begin(), field.flat().end());
+      });
+    }
+    for (std::size_t round = 0; round < 2 * count; ++round) {
+      const auto instance_in = [&](std::size_t l) { return (round + l * (round < count ? 1 : 2)) % count; };
+      Rig<Pack> rig(model);
+      for (std::size_t l = 0; l < Pack::size; ++l) rig.set(instances[instance_in(l)], l);
+      kernel.prepare(rig);
+      kernel.run(rig);
+      for (std::size_t l = 0; l < Pack::size; ++l) {
+        const std::size_t k = instance_in(l);
+        const bool first = packed[k].empty();
+        std::size_t at = 0;
+        Rig<Pack>::each(rig, [&](const char* name, auto& field, Rows) {
+          double scale = 0, worst = 0;
+          bool equal = true, both_known = true;
+          for (std::size_t n = 0; n < field.flat().size(); ++n) {
+            const double expected = plain[k][at + n], found = lane(field.flat()[n], l);
+            if (first) packed[k].push_back(found);
+            equal = equal && same_bits(found, packed[k][at + n]);
+            both_known = both_known && std::isnan(found) == std::isnan(expected);
+            if (std::isnan(expected)) continue;
+            scale = std::max(scale, std::abs(expected));
+            worst = std::max(worst, std::abs(found - expected));
+          }
+          at += field.flat().size();
+          if (equal && both_known && worst <= tolerance * scale) return;
+          CAPTURE(model.names.model, name, round, l, k, worst, scale);
+          REQUIRE(equal);
+          REQUIRE(both_known);
+          REQUIRE(worst <= tolerance * scale);
+        });
+      }
+    }
+  }
+}
+
+}  // namespace linden
