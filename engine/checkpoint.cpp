@@ -14,7 +14,7 @@
 
 #include "engine/output_file.hpp"
 #include "engine/simulation.hpp"
-#include "layout/builder.hpp"
+#include "layout/input_error.hpp"
 
 namespace linden {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "layout/builder.hpp"
+#include "layout/input_error.hpp"
 
 namespace linden {
 namespace {

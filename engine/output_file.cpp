@@ -12,7 +12,7 @@
 #include <utility>
 #include <utility>
 
-#include "layout/builder.hpp"
+#include "layout/input_error.hpp"
 
 namespace linden {
 namespace {

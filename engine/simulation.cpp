@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "layout/builder.hpp"
+#include "layout/input_error.hpp"
 
 namespace linden {
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <charconv>
 
-#include "layout/builder.hpp"
+#include "layout/input_error.hpp"
 
 namespace linden {
 namespace {

@@ -16,20 +16,14 @@
 
 #include <Eigen/Geometry>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "layout/input_error.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
-
-/// Bad input: a file, a link or a joint that cannot be simulated. The message says where, what was found, what was expected.
-class InputError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 enum class JointType : std::uint8_t { fixed, revolute, prismatic, helical, ball, free, planar };
 
@@ -56,9 +50,9 @@ struct LinkSpec {
   std::string parent;  // name of the parent link; empty = the world
   std::string joint;
   JointType type = JointType::revolute;
-  Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  // joint frame (= link frame at zero) in the parent link's frame
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();              // in the joint frame; normal of the plane for planar joints
-  double pitch = 0;                                             // [m/rad], helical only
+  Pose placement = Pose::Identity();  // joint frame (= link frame at zero) in the parent link's frame
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  // in the joint frame; normal of the plane for planar joints
+  double pitch = 0;  // [m/rad], helical only
   LinkInertia inertia;
   JointLimits limits;
   double damping = 0, friction = 0;

@@ -6,7 +6,7 @@
 #include <array>
 #include <span>
 
-#include "layout/builder.hpp"
+#include "layout/input_error.hpp"
 #include "layout/words.hpp"
 
 namespace linden {

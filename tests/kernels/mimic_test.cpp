@@ -214,7 +214,7 @@ TEST_CASE("a tied solve gives equal bits in every lane") {
                                     mimics.complete(rig.work.residual);
                                   },
                                   {"residual"});
-  check_lanes(kernel);
+  check_lanes(kernel, kAfterElimination);
 }
 
 }  // namespace

@@ -253,6 +253,9 @@ void check_allocates_nothing(const Kernel<Prepare, Run>& kernel) {
   check_allocates_nothing_as<Pack>(kernel);
 }
 
+/// Behind newton_factor_up at steps of 2 rad: d may be small there, and rounding grows with the condition of what is eliminated.
+constexpr double kAfterElimination = 1e-10;
+
 /// `tolerance`: difference to the plain path, in units of the largest number of a field.
 template <class Prepare, class Run>
 void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {

@@ -1,0 +1,88 @@
+// Pictures appear whole or not at all, say what they show, and keep a spike of a single sample.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "engine/plot.hpp"
+
+namespace linden {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Folder {
+  fs::path path = fs::temp_directory_path() / ("linden-plot-test-" + std::to_string(::getpid()));
+  Folder() { fs::create_directories(path); }
+  ~Folder() { fs::remove_all(path); }
+  std::string file(const std::string& name) const { return (path / name).string(); }
+};
+
+plot::Chart wave(std::size_t samples) {
+  plot::Series series{.label = "sine", .x = {}, .y = {}};
+  for (std::size_t k = 0; k < samples; ++k) {
+    series.x.push_back(static_cast<double>(k));
+    series.y.push_back(std::sin(1e-3 * static_cast<double>(k)));
+  }
+  return {"A wave", "of a test", {"time [s]"}, {"height [m]"}, {series}};
+}
+
+std::string bytes_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+TEST_CASE("a chart becomes an SVG or a PNG by its ending, and nothing else is left in the folder") {
+  const Folder folder;
+  plot::draw(folder.file("wave.svg"), wave(1000));
+  plot::draw(folder.file("wave.png"), wave(1000));
+  const std::string svg = bytes_of(folder.file("wave.svg"));
+  CHECK_THAT(svg, Catch::StartsWith("<?xml"));
+  for (const char* word : {"A wave", "time [s]", "height [m]", "sine"}) CHECK_THAT(svg, Catch::Contains(word));
+  CHECK(bytes_of(folder.file("wave.png")).substr(1, 3) == "PNG");
+  CHECK(std::distance(fs::directory_iterator(folder.path), fs::directory_iterator()) == 2);
+}
+
+TEST_CASE("a million samples make a small file") {
+  const Folder folder;
+  plot::draw(folder.file("long.svg"), wave(1'000'000));
+  CHECK(fs::file_size(folder.file("long.svg")) < 500'000);
+}
+
+TEST_CASE("thinning keeps the extremes of every column and the gaps between") {
+  std::vector<plot::Point> points;
+  for (int k = 0; k < 1000; ++k) points.push_back({static_cast<double>(k), k == 456 ? 7.0 : k == 700 ? -3.0 : 0.0});
+  points[800].y = std::nan("");
+  const std::vector<plot::Point> kept = plot::thinned(points, 100);
+  CHECK(kept.size() <= 44);
+  CHECK(std::ranges::count_if(kept, [](const plot::Point& p) { return p.x == 456 && p.y == 7; }) == 1);
+  CHECK(std::ranges::count_if(kept, [](const plot::Point& p) { return p.x == 700 && p.y == -3; }) == 1);
+}
+
+TEST_CASE("numbers that cannot be drawn break the line and nothing else") {
+  const Folder folder;
+  plot::Chart chart = wave(100);
+  chart.series[0].y[50] = std::nan("");
+  chart.series[0].y[60] = std::numeric_limits<double>::infinity();
+  CHECK_NOTHROW(plot::draw(folder.file("gap.svg"), chart));
+  chart.y.log = true;  // half of a sine is negative
+  CHECK_NOTHROW(plot::draw(folder.file("log.svg"), chart));
+  for (double& y : chart.series[0].y) y = 42;
+  CHECK_NOTHROW(plot::draw(folder.file("constant.png"), chart));
+}
+
+TEST_CASE("what cannot be drawn is refused with the reason, and no file appears") {
+  const Folder folder;
+  CHECK_THROWS_WITH(plot::draw(folder.file("wave.jpg"), wave(10)), Catch::Contains(".svg or .png"));
+  CHECK_THROWS_WITH(plot::draw(folder.file("no/wave.svg"), wave(10)), Catch::Contains("no folder"));
+  plot::Chart empty = wave(10);
+  empty.series.clear();
+  CHECK_THROWS_WITH(plot::draw(folder.file("empty.svg"), empty), Catch::Contains("A wave"));
+  plot::Chart uneven = wave(10);
+  uneven.series[0].y.pop_back();
+  CHECK_THROWS(plot::draw(folder.file("uneven.svg"), uneven));
+  CHECK(fs::is_empty(folder.path));
+}
+
+}  // namespace
+}  // namespace linden
