@@ -7,8 +7,9 @@
 namespace linden {
 namespace {
 
-const auto kernel = make_kernel([](auto& rig) { place(rig); },
-                                [](auto& rig) { advance_map(rig.tree, rig.work.motion, rig.work.delta, rig.state.q); }, {}, {"q"});
+const auto kernel =
+    make_kernel([](auto& rig) { place(rig); },
+                [](auto& rig) { advance_map(rig.tree, rig.work.motion, rig.work.delta, rig.state.q); }, {}, {"q"});
 
 TEST_CASE("advance_map moves every joint by its motion: T(q') = T(q) M") {
   double worst_pose = 0, worst_plain = 0;
@@ -23,14 +24,16 @@ TEST_CASE("advance_map moves every joint by its motion: T(q') = T(q) M") {
       const VectorXd q = vector(rig.state.q), none = VectorXd::Zero(tree.velocities);
       for (Index i = 1; i < tree.slots(); ++i) {
         const auto after = reference::joint_pose<double>(tree.body(i), q, none);
-        const auto expected = (reference::joint_pose<double>(tree.body(i), instance.q, none) *
-                               row<Displacement>(rig.work.motion, i)).eval();
+        const auto expected =
+            (reference::joint_pose<double>(tree.body(i), instance.q, none) * row<Displacement>(rig.work.motion, i))
+                .eval();
         see(worst_pose, (after - expected).cwiseAbs().maxCoeff());
       }
       see(worst_plain, (q - reference::advanced(tree, instance.q, instance.delta)).cwiseAbs().maxCoeff());
     }
   }
-  INFO("worst difference of poses: " << worst_pose / kEpsilon << " epsilon, of positions: " << worst_plain / kEpsilon << " epsilon");
+  INFO("worst difference of poses: " << worst_pose / kEpsilon << " epsilon, of positions: " << worst_plain / kEpsilon
+                                     << " epsilon");
   CHECK(worst_pose < 16 * kEpsilon);
   CHECK(worst_plain < 16 * kEpsilon);
 }

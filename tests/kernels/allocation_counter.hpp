@@ -1,5 +1,5 @@
 // tests/kernels/allocation_counter.hpp
-// How often memory was asked for: every operator new of the program is counted, of all threads and all libraries linked in.
+// How often memory was asked for: every operator new of the program is counted, of all threads and all its libraries.
 #pragma once
 
 #include <cstdint>

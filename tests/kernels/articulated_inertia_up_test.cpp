@@ -12,8 +12,8 @@ namespace {
 
 const auto kernel = make_kernel([](auto& rig) { place(rig); },
                                 [](auto& rig) {
-                                  articulated_inertia_up(rig.tree, rig.constants, rig.work.placement, rig.work.articulated,
-                                                         rig.gains());
+                                  articulated_inertia_up(rig.tree, rig.constants, rig.work.placement,
+                                                         rig.work.articulated, rig.gains());
                                 },
                                 {"articulated", "gain_up", "gain_down", "joint_inverse"});
 

@@ -44,9 +44,10 @@ TEST_CASE("a joint taken out of a 6 x 6 matrix leaves A - A S d^-1 S^T A and its
       };
       const double condition = dense.norm() * inverse.norm();
       compare(inverse_block(rig.work.joint_inverse, model.tree.first_block(i), n), inverse, inverse.norm() * condition);
-      compare(gain_rows(rig.work.gain_up, first, n).transpose(), dense * S * inverse, (dense * S * inverse).norm() * condition);
+      compare(gain_rows(rig.work.gain_up, first, n).transpose(), dense * S * inverse,
+              (dense * S * inverse).norm() * condition);
       compare(gain_rows(rig.work.gain_down, first, n), inverse * S.transpose() * dense,
-          (inverse * S.transpose() * dense).norm() * condition);
+              (inverse * S.transpose() * dense).norm() * condition);
       const Matrix6 left = dense - dense * S * inverse * S.transpose() * dense;
       compare(eigen(felt), left, dense.norm() * condition);
       // the directions that the joint frees pass nothing on
@@ -64,7 +65,8 @@ TEST_CASE("a free joint passes on exactly nothing, a ball joint exactly no momen
   Rig<double> rig(model);
   int balls = 0, frees = 0;
   down(model.tree, [&](auto joint, Index i) {
-    const Matrix6 felt = eigen(eliminate_joint(joint, model.tree, model.constants, i, random_matrix6(random), rig.gains()));
+    const Matrix6 felt =
+        eigen(eliminate_joint(joint, model.tree, model.constants, i, random_matrix6(random), rig.gains()));
     if constexpr (joint == JointKind::free) CHECK(felt.isZero(0));
     if constexpr (joint == JointKind::ball) CHECK((felt.topRows<3>().isZero(0) && felt.leftCols<3>().isZero(0)));
     balls += joint == JointKind::ball ? 1 : 0;
@@ -84,7 +86,8 @@ TEST_CASE("a hinge with inertia 4 about its axis has the gains of a hinge") {
   A(2, 2) = 4;
   A(2, 0) = 2;  // row z
   A(5, 2) = 8;  // column z
-  const Matrix6 felt = eigen(eliminate_joint(Joint<JointKind::screw>{}, model.tree, model.constants, 1, mat6(A), rig.gains()));
+  const Matrix6 felt =
+      eigen(eliminate_joint(Joint<JointKind::screw>{}, model.tree, model.constants, 1, mat6(A), rig.gains()));
   CHECK(rig.work.joint_inverse(0) == 0.25);
   CHECK((rig.work.gain_up(0, 2) == 1 && rig.work.gain_up(0, 5) == 2 && rig.work.gain_up(0, 0) == 0));
   CHECK((rig.work.gain_down(0, 2) == 1 && rig.work.gain_down(0, 0) == 0.5 && rig.work.gain_down(0, 5) == 0));
@@ -112,17 +115,17 @@ TEST_CASE("a 6 x 6 matrix is spread row by row") {
 }
 
 TEST_CASE("eliminating joints writes every gain, allocates nothing and gives equal bits in every lane") {
-  const auto kernel = make_kernel([](auto& rig) { factor_mass(rig); },
-                                  [](auto& rig) {
-                                    down(rig.tree, [&](auto joint, Index i) {
-                                      using S = std::decay_t<decltype(rig.h)>;
-                                      const auto A = load<Mat6, S>(rig.work.articulated, i);
-                                      const Mat6<S> felt =
-                                          eliminate_joint(joint, rig.tree, rig.constants, i, A, rig.gains());
-                                      store(rig.work.articulated, i, to_parent(load<Placement, S>(rig.work.placement, i), felt));
-                                    });
-                                  },
-                                  {"gain_up", "gain_down", "joint_inverse"}, {"articulated"});
+  const auto kernel =
+      make_kernel([](auto& rig) { factor_mass(rig); },
+                  [](auto& rig) {
+                    down(rig.tree, [&](auto joint, Index i) {
+                      using S = std::decay_t<decltype(rig.h)>;
+                      const auto A = load<Mat6, S>(rig.work.articulated, i);
+                      const Mat6<S> felt = eliminate_joint(joint, rig.tree, rig.constants, i, A, rig.gains());
+                      store(rig.work.articulated, i, to_parent(load<Placement, S>(rig.work.placement, i), felt));
+                    });
+                  },
+                  {"gain_up", "gain_down", "joint_inverse"}, {"articulated"});
   check_writes(kernel);
   check_allocates_nothing(kernel);
   check_lanes(kernel);

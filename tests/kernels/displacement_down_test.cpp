@@ -9,13 +9,13 @@ namespace {
 
 const auto kernel = make_kernel([](auto& rig) { place(rig); },
                                 [](auto& rig) {
-                                  rig.result(0) =
-                                      displacement_down(rig.tree, rig.work.placement, rig.work.motion, rig.work.displacement);
+                                  rig.result(0) = displacement_down(rig.tree, rig.work.placement, rig.work.motion,
+                                                                    rig.work.displacement);
                                 },
                                 {"displacement", "result"});
 
-/// dT_i by (19) literally, in long double, from the placements and motions as they are stored. What was rounded is not quite a rotation:
-/// a transpose that is no inverse, or a quaternion that is not quite of unit length, would drown a small step.
+/// dT_i by (19) literally, in long double, from the placements and motions as they are stored. What was rounded is not
+/// quite a rotation: a transpose that is no inverse, or a quaternion not of unit length, would drown a small step.
 std::vector<reference::Matrix4<long double>> literal_displacements(const Rig<double>& rig) {
   using Matrix = reference::Matrix4<long double>;
   std::vector<Matrix> result(static_cast<std::size_t>(rig.tree.shape.slots), Matrix::Identity());

@@ -18,12 +18,16 @@ const auto field_down = make_kernel([](auto& rig) { place(rig); },
                                     },
                                     {"field"});
 
-const auto force_up = make_kernel([](auto& rig) { place(rig); field_down.run(rig); },
-                                  [](auto& rig) {
-                                    rig.result(0) = gravity_force_up(rig.tree, rig.constants, rig.work.placement, rig.work.field,
-                                                                     rig.work.first_moment, rig.work.force);
-                                  },
-                                  {"first_moment", "force", "result"});
+const auto force_up = make_kernel(
+    [](auto& rig) {
+      place(rig);
+      field_down.run(rig);
+    },
+    [](auto& rig) {
+      rig.result(0) = gravity_force_up(rig.tree, rig.constants, rig.work.placement, rig.work.field,
+                                       rig.work.first_moment, rig.work.force);
+    },
+    {"first_moment", "force", "result"});
 
 TEST_CASE("gravity's force is minus the derivative of the potential, and its potential that of all masses") {
   double worst_force = 0, worst_potential = 0, worst_field = 0;
@@ -46,8 +50,8 @@ TEST_CASE("gravity's force is minus the derivative of the potential, and its pot
       }
     }
   }
-  INFO("worst relative error of the force " << worst_force << ", of the potential " << worst_potential << ", of the field "
-                                            << worst_field);
+  INFO("worst relative error of the force " << worst_force << ", of the potential " << worst_potential
+                                            << ", of the field " << worst_field);
   CHECK(worst_force < 1e-13);
   CHECK(worst_potential < 1e-13);
   CHECK(worst_field < 1e-14);

@@ -61,7 +61,7 @@ TEST_CASE("impulse_pass_up returns the energy norm r.M^-1 r, and for the Jacobia
 }
 
 TEST_CASE("a push on the last of two equal sliders in a row is felt by the first in full") {
-  // x slides, then x slides again: M = [2 1; 1 1]; a push on the second joint alone yields there and nothing is left for the first
+  // slide along x, then again along x: M = [2 1; 1 1]; r = (0, 3)
   LinkSpec first, second;
   first.name = first.joint = "first";
   second.name = second.joint = "second";

@@ -7,11 +7,10 @@
 namespace linden {
 namespace {
 
-const auto kernel = make_kernel([](auto& rig) { find_momenta(rig); },
-                                [](auto& rig) {
-                                  impulse_up(rig.tree, rig.constants, rig.work.placement, rig.work.impulse, rig.work.increment);
-                                },
-                                {"increment"}, {"impulse"});
+const auto kernel = make_kernel(
+    [](auto& rig) { find_momenta(rig); },
+    [](auto& rig) { impulse_up(rig.tree, rig.constants, rig.work.placement, rig.work.impulse, rig.work.increment); },
+    {"increment"}, {"impulse"});
 
 TEST_CASE("impulse_up is the sum over all descendants, each brought up by the poses of the two bodies alone") {
   double worst = 0;
@@ -34,8 +33,10 @@ TEST_CASE("impulse_up is the sum over all descendants, each brought up by the po
     for (Index i = 1; i < tree.slots(); ++i) {
       // body i is felt by itself, by every ancestor and by the world
       for (Index a = i;; a = tree.body(a).parent) {
-        const auto relative = (reference::inverse<double>(pose[static_cast<std::size_t>(i)]) * pose[static_cast<std::size_t>(a)]).eval();
-        F[static_cast<std::size_t>(a)] += reference::adjoint<double>(relative).transpose() * own[static_cast<std::size_t>(i)];
+        const auto relative =
+            (reference::inverse<double>(pose[static_cast<std::size_t>(i)]) * pose[static_cast<std::size_t>(a)]).eval();
+        F[static_cast<std::size_t>(a)] +=
+            reference::adjoint<double>(relative).transpose() * own[static_cast<std::size_t>(i)];
         if (a == 0) break;
       }
     }

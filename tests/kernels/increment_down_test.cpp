@@ -9,11 +9,19 @@
 namespace linden {
 namespace {
 
-const auto newton = make_kernel([](auto& rig) { factor_newton(rig); pass_up(rig, rig.right_side); },
-                                [](auto& rig) { pass_down_newton(rig); }, {"variation", "increment"});
+const auto newton = make_kernel(
+    [](auto& rig) {
+      factor_newton(rig);
+      pass_up(rig, rig.right_side);
+    },
+    [](auto& rig) { pass_down_newton(rig); }, {"variation", "increment"});
 
-const auto mass = make_kernel([](auto& rig) { factor_mass(rig); pass_up(rig, rig.right_side); },
-                              [](auto& rig) { pass_down_mass(rig); }, {"variation", "increment"});
+const auto mass = make_kernel(
+    [](auto& rig) {
+      factor_mass(rig);
+      pass_up(rig, rig.right_side);
+    },
+    [](auto& rig) { pass_down_mass(rig); }, {"variation", "increment"});
 
 TEST_CASE("the increments of both passes solve the dense equations") {
   double worst_newton = 0, worst_mass = 0;

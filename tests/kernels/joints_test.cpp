@@ -55,7 +55,7 @@ TEST_CASE("a joint adds S a to a twist and takes S^T F of a wrench") {
       const Wrench<double> F = random_wrench(random, 1);
       const Twist<double> sum = add_motion(joint, model.constants, i, first, rig.rate, V);
       CHECK(relative_error(eigen(sum), eigen(V) + body.S * a) < 4 * kEpsilon);
-      const VectorXd projected = eigen(project(joint, model.constants, i, F)).head(body.dofs());
+      const VectorXd projected = VectorXd(eigen(project(joint, model.constants, i, F))).head(body.dofs());
       CHECK(relative_error(projected, body.S.transpose() * eigen(F)) < 4 * kEpsilon);
     });
   }

@@ -2,17 +2,6 @@
 // Packs as Scalars, one lane at a time, and the proof that a function of numbers treats all lanes alike.
 #pragma once
 
-// GCC sees the deliberately undefined registers of its own AVX-512 header as mistakes.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
-#include <xsimd/xsimd.hpp>
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -22,6 +11,7 @@
 #include <cstdint>
 #include <limits>
 #include <vector>
+#include <xsimd/xsimd.hpp>
 
 #include "tests/kernels/allocation_counter.hpp"
 
@@ -59,9 +49,9 @@ void see(double& worst, Errors... errors) {
   ((worst = std::isnan(errors) ? std::numeric_limits<double>::infinity() : std::max(worst, errors)), ...);
 }
 
-/// f: array of numbers -> array of numbers, given as a generic lambda. Every sample visits every lane, in two kinds of company: its
-/// result has the same bits wherever it stands and is within `tolerance` of the plain path, in units of the largest number of the
-/// result. Nothing allocates.
+/// f: array of numbers -> array of numbers, given as a generic lambda. Every sample visits every lane, in two kinds of
+/// company: its result has the same bits wherever it stands and is within `tolerance` of the plain path, in units of
+/// its largest number. Nothing allocates.
 template <std::size_t In, class Function>
 void check_value_lanes(const Function& f, const std::vector<std::array<double, In>>& samples, double tolerance) {
   using Result = decltype(f(samples[0]));
@@ -71,7 +61,9 @@ void check_value_lanes(const Function& f, const std::vector<std::array<double, I
   std::int64_t allocations = 0;
   for (const std::size_t stride : {1u, 3u}) {
     for (std::size_t round = 0; round < samples.size(); ++round) {
-      const auto sample_in = [&](std::size_t l) { return (round + stride * l) % samples.size(); };
+      const auto sample_in = [&](std::size_t l) {
+        return (round + stride * l) % samples.size();
+      };
       std::array<Pack, In> in{};
       for (std::size_t l = 0; l < Pack::size; ++l) {
         for (std::size_t k = 0; k < In; ++k) set_lane(in[k], l, samples[sample_in(l)][k]);

@@ -23,8 +23,8 @@ std::vector<Mimic> random_ties(const Tree& tree, std::uint64_t seed, std::size_t
   for (std::size_t k = 0; k < count; ++k) {
     const Index follower = screws[k], leader = screws[count + k % leaders];
     const double multiplier = random.uniform(0.3, 2) * (k % 2 == 0 ? 1 : -1);
-    ties.push_back({follower, leader, tree.first_v(follower), tree.first_v(leader), tree.first_q(follower), tree.first_q(leader),
-                    multiplier, 0.25});
+    ties.push_back({follower, leader, tree.first_v(follower), tree.first_v(leader), tree.first_q(follower),
+                    tree.first_q(leader), multiplier, 0.25});
   }
   return ties;
 }
@@ -39,7 +39,8 @@ MatrixXd tie_matrix(const std::vector<Mimic>& ties, Index velocities) {
   MatrixXd result(velocities, velocities - static_cast<Index>(ties.size()));
   Index next = 0;
   for (Index column = 0; column < velocities; ++column) {
-    const bool follows = std::any_of(ties.begin(), ties.end(), [&](const Mimic& tie) { return tie.follower_v == column; });
+    const bool follows =
+        std::any_of(ties.begin(), ties.end(), [&](const Mimic& tie) { return tie.follower_v == column; });
     if (!follows) result.col(next++) = A.col(column);
   }
   return result;
@@ -82,7 +83,8 @@ TEST_CASE("fold_mimics is the transpose of spread_mimics") {
     MatrixXd pick = MatrixXd::Zero(A.cols(), n);
     Index next = 0;
     for (Index row = 0; row < n; ++row) {
-      const bool follows = std::any_of(ties.begin(), ties.end(), [&](const Mimic& tie) { return tie.follower_v == row; });
+      const bool follows =
+          std::any_of(ties.begin(), ties.end(), [&](const Mimic& tie) { return tie.follower_v == row; });
       if (follows) CHECK(impulse(row) == 0);
       if (!follows) pick(next++, row) = 1;
     }
@@ -203,17 +205,18 @@ TEST_CASE("ties allocate nothing once they are made") {
 }
 
 TEST_CASE("a tied solve gives equal bits in every lane") {
-  const auto kernel = make_kernel([](auto& rig) { factor_newton(rig); },
-                                  [](auto& rig) {
-                                    using S = std::decay_t<decltype(rig.h)>;
-                                    const std::vector<Mimic> ties = random_ties(rig.tree, 6, 2);
-                                    MimicTies<S> mimics(ties, rig.tree.shape.velocities);
-                                    mimics.factor([&](const Field<S>& r, Field<S>& out) { solve_newton(rig, r, out); }, rig.rate);
-                                    fold_mimics<S>(ties, rig.right_side);
-                                    solve_newton(rig, rig.right_side, rig.work.residual);
-                                    mimics.complete(rig.work.residual);
-                                  },
-                                  {"residual"});
+  const auto kernel =
+      make_kernel([](auto& rig) { factor_newton(rig); },
+                  [](auto& rig) {
+                    using S = std::decay_t<decltype(rig.h)>;
+                    const std::vector<Mimic> ties = random_ties(rig.tree, 6, 2);
+                    MimicTies<S> mimics(ties, rig.tree.shape.velocities);
+                    mimics.factor([&](const Field<S>& r, Field<S>& out) { solve_newton(rig, r, out); }, rig.rate);
+                    fold_mimics<S>(ties, rig.right_side);
+                    solve_newton(rig, rig.right_side, rig.work.residual);
+                    mimics.complete(rig.work.residual);
+                  },
+                  {"residual"});
   check_lanes(kernel, kAfterElimination);
 }
 

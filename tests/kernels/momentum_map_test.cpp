@@ -10,14 +10,16 @@ namespace {
 
 const auto at_begin = make_kernel([](auto& rig) { displace(rig); },
                                   [](auto& rig) {
-                                    rig.result(0) = momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist,
-                                                                 rig.work.body_momentum, rig.work.impulse);
+                                    rig.result(0) =
+                                        momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist,
+                                                     rig.work.body_momentum, rig.work.impulse);
                                   },
                                   {"twist", "body_momentum", "impulse", "result"});
 
-const auto at_end = make_kernel([](auto& rig) { find_momenta(rig); },
-                                [](auto& rig) { end_momentum_map(rig.tree, rig.work.twist, rig.work.body_momentum, rig.work.impulse); },
-                                {"impulse"});
+const auto at_end =
+    make_kernel([](auto& rig) { find_momenta(rig); },
+                [](auto& rig) { end_momentum_map(rig.tree, rig.work.twist, rig.work.body_momentum, rig.work.impulse); },
+                {"impulse"});
 
 TEST_CASE("momentum_map is log, G hV and the series of dlog transposed") {
   double worst = 0;
@@ -36,8 +38,9 @@ TEST_CASE("momentum_map is log, G hV and the series of dlog transposed") {
         u << w, reference::bernoulli_series<double, 3>(reference::hat<double>(w)) * eigen(D.p);
         const reference::Vector6<double> m = tree.body(i).G * u, mu = reference::dlog<double>(u).transpose() * m;
         energy += 0.5 * u.dot(m);
-        see(worst, relative_error(row<Twist>(rig.work.twist, i), u), relative_error(row<Wrench>(rig.work.body_momentum, i), m),
-                          relative_error(row<Wrench>(rig.work.impulse, i), mu));
+        see(worst, relative_error(row<Twist>(rig.work.twist, i), u),
+            relative_error(row<Wrench>(rig.work.body_momentum, i), m),
+            relative_error(row<Wrench>(rig.work.impulse, i), mu));
       }
       CHECK(rig.result(0) == Approx(energy).epsilon(1e-14));
       at_end.run(rig);

@@ -9,16 +9,15 @@
 namespace linden {
 namespace {
 
-const auto target = make_kernel([](auto&) {},
-                                [](auto& rig) {
-                                  momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target);
-                                },
-                                {"momentum_target"});
+const auto target = make_kernel(
+    [](auto&) {},
+    [](auto& rig) { momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target); },
+    {"momentum_target"});
 
 const auto update = make_kernel([](auto& rig) { find_residual(rig); },
                                 [](auto& rig) {
-                                  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.right_side, rig.work.residual,
-                                                      rig.work.force, rig.state.p);
+                                  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.right_side,
+                                                      rig.work.residual, rig.work.force, rig.state.p);
                                 },
                                 {"p"});
 
@@ -30,7 +29,8 @@ void finish(Rig<double>& rig) {
   advance_map(rig.tree, rig.work.motion, rig.work.delta, rig.state.q);
   placement_map(rig.tree, rig.constants, rig.state.q, rig.work.placement);
   impulse_up(rig.tree, rig.constants, rig.work.placement, rig.work.impulse, rig.work.increment);
-  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.work.increment, rig.work.residual, rig.work.force, rig.state.p);
+  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.work.increment, rig.work.residual, rig.work.force,
+                      rig.state.p);
 }
 
 TEST_CASE("the target is h (p + h/2 Q), and the update (projected - C r) / h + h/2 Q") {
@@ -57,7 +57,8 @@ TEST_CASE("the target is h (p + h/2 Q), and the update (projected - C r) / h + h
       }
       // the rows of S^T Ad_dT^T S: all of it for a free joint, the turn alone for a ball
       const auto Ad = reference::adjoint<double>(row<Displacement>(rig.work.displacement, i));
-      p.segment(body.v, body.dofs()) -= body.S.transpose() * Ad.transpose() * body.S * residual.segment(body.v, body.dofs());
+      p.segment(body.v, body.dofs()) -=
+          body.S.transpose() * Ad.transpose() * body.S * residual.segment(body.v, body.dofs());
     }
     see(worst, relative_error(vector(rig.state.p), p / h + h / 2 * instance.force));
   }
@@ -98,7 +99,8 @@ TEST_CASE("a free rigid body's momentum is carried on exactly by any displacemen
     finish(rig);
     CHECK(vector(rig.work.residual).norm() > 1e-3);
     // p is given in the body's frame: at the end of the step it is seen from there
-    const VectorXd expected = reference::adjoint<double>(row<Displacement>(rig.work.displacement, 1)).transpose() * instance.p;
+    const VectorXd expected =
+        reference::adjoint<double>(row<Displacement>(rig.work.displacement, 1)).transpose() * instance.p;
     see(worst, relative_error(vector(rig.state.p), expected));
   }
   INFO("worst relative error: " << worst / kEpsilon << " epsilon");

@@ -7,20 +7,20 @@
 namespace linden {
 namespace {
 
-const auto motion = make_kernel([](auto&) {},
-                                [](auto& rig) { motion_map(rig.tree, rig.constants, rig.work.delta, rig.work.motion); },
-                                {"motion"});
+const auto motion = make_kernel(
+    [](auto&) {}, [](auto& rig) { motion_map(rig.tree, rig.constants, rig.work.delta, rig.work.motion); }, {"motion"});
 
-const auto correction = make_kernel([](auto& rig) { place(rig); },
-                                    [](auto& rig) {
-                                      using S = std::decay_t<decltype(rig.h)>;
-                                      correct_motion_map(rig.tree, rig.constants, rig.rate, S(0.25), rig.work.delta, rig.work.motion);
-                                    },
-                                    {}, {"motion", "delta"});
+const auto correction =
+    make_kernel([](auto& rig) { place(rig); },
+                [](auto& rig) {
+                  using S = std::decay_t<decltype(rig.h)>;
+                  correct_motion_map(rig.tree, rig.constants, rig.rate, S(0.25), rig.work.delta, rig.work.motion);
+                },
+                {}, {"motion", "delta"});
 
-const auto displacement = make_kernel([](auto& rig) { find_momenta(rig); },
-                                      [](auto& rig) { displacement_map(rig.tree, rig.work.displacement, rig.work.delta); }, {},
-                                      {"delta"});
+const auto displacement =
+    make_kernel([](auto& rig) { find_momenta(rig); },
+                [](auto& rig) { displacement_map(rig.tree, rig.work.displacement, rig.work.delta); }, {}, {"delta"});
 
 TEST_CASE("motion_map is exp of S delta for turns from 1e-12 to nearly pi") {
   double worst = 0;
@@ -39,7 +39,7 @@ TEST_CASE("motion_map is exp of S delta for turns from 1e-12 to nearly pi") {
         const Eigen::Vector4d turn = reference::rotation_quaternion<double>(u.head<3>());
         const Eigen::Vector3d shift = reference::exp<double>(u).topRightCorner<3, 1>();
         see(worst, relative_error(eigen(M.r).head<3>(), turn.head<3>()), std::abs(M.r.w - turn[3]),
-                          relative_error(eigen(M.p), shift));
+            relative_error(eigen(M.p), shift));
       }
     }
   }

@@ -10,17 +10,18 @@
 namespace linden {
 namespace {
 
-const auto kernel = make_kernel([](auto& rig) { find_momenta(rig); },
-                                [](auto& rig) {
-                                  newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.twist,
-                                                   rig.work.body_momentum, rig.work.articulated, rig.gains());
-                                },
-                                {"articulated", "gain_up", "gain_down", "joint_inverse"});
+const auto kernel =
+    make_kernel([](auto& rig) { find_momenta(rig); },
+                [](auto& rig) {
+                  newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.twist,
+                                   rig.work.body_momentum, rig.work.articulated, rig.gains());
+                },
+                {"articulated", "gain_up", "gain_down", "joint_inverse"});
 
 const auto pose_derivatives = make_kernel([](auto& rig) { find_momenta(rig); },
                                           [](auto& rig) {
-                                            pose_derivative_map(rig.tree, rig.constants, rig.work.twist, rig.work.body_momentum,
-                                                                rig.work.articulated);
+                                            pose_derivative_map(rig.tree, rig.constants, rig.work.twist,
+                                                                rig.work.body_momentum, rig.work.articulated);
                                           },
                                           {"articulated"});
 
@@ -108,12 +109,13 @@ TEST_CASE("Newton's method converges quadratically: a tenth of the error leaves 
       double norm = 0;
       for (int pass = 0; pass < 2; ++pass) {
         displacement_down(rig.tree, rig.work.placement, rig.work.motion, rig.work.displacement);
-        momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist, rig.work.body_momentum, rig.work.impulse);
+        momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist, rig.work.body_momentum,
+                     rig.work.impulse);
         momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target);
         norm = residual_up(rig.tree, rig.constants, rig.work.placement, rig.work.momentum_target, rig.work.impulse,
                            rig.work.residual);
-        newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.twist, rig.work.body_momentum,
-                         rig.work.articulated, rig.gains());
+        newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.twist,
+                         rig.work.body_momentum, rig.work.articulated, rig.gains());
         pass_up(rig, rig.work.residual);
         pass_down_newton(rig);
         correct_motion_map(rig.tree, rig.constants, rig.work.increment, 1.0, rig.work.delta, rig.work.motion);
@@ -142,7 +144,8 @@ TEST_CASE("a hinge turns by its axis inertia alone however far it turns, a ball 
     return vector(rig.work.joint_inverse);
   };
   for (const double turn : {0.0, 1e-6, 1.0, 3.0}) {
-    CHECK(factored(JointType::revolute, VectorXd::Zero(1), VectorXd::Constant(1, turn))[0] == Approx(1.0 / 3).epsilon(1e-13));
+    CHECK(factored(JointType::revolute, VectorXd::Zero(1), VectorXd::Constant(1, turn))[0] ==
+          Approx(1.0 / 3).epsilon(1e-13));
   }
   // h mu = 3 w, w changes by dlog_-w eta: d = 3 dlog_-w
   const Eigen::Vector3d w(0.6, -1.2, 1);

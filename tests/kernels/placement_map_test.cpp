@@ -7,9 +7,9 @@
 namespace linden {
 namespace {
 
-const auto kernel = make_kernel([](auto&) {},
-                                [](auto& rig) { placement_map(rig.tree, rig.constants, rig.state.q, rig.work.placement); },
-                                {"placement"});
+const auto kernel = make_kernel(
+    [](auto&) {}, [](auto& rig) { placement_map(rig.tree, rig.constants, rig.state.q, rig.work.placement); },
+    {"placement"});
 
 TEST_CASE("placement_map places every body in its parent as 4 x 4 matrices do") {
   double worst = 0;
@@ -44,7 +44,8 @@ TEST_CASE("a helix shifts by its pitch while it turns, a slide only shifts, a hi
     rig.state.q(0) = q;
     kernel.run(rig);
     // the builder may turn the frame about its own axis: what the axis and the angle do is what counts
-    const auto zero = reference::joint_pose<double>(reference::plain_tree(model).body(1), VectorXd::Zero(1), VectorXd::Zero(1));
+    const auto zero =
+        reference::joint_pose<double>(reference::plain_tree(model).body(1), VectorXd::Zero(1), VectorXd::Zero(1));
     return (row<Placement>(rig.work.placement, 1) * reference::inverse<double>(zero)).eval();
   };
   const double quarter = std::numbers::pi / 2;

@@ -68,14 +68,22 @@ void check_all(double bound) {
     const long double t = std::sqrt(tt);
     return t > 0 ? std::atan(t) / t : 1.0L;
   };
-  check("atan_over_t", 1, [](S x) { return atan_over_t(x); }, atan_truth);
-  check("sinc", pi * pi / 4, [](S x) { return sinc(x); }, [](long double x) { return alternating_series(x, 1); });
-  check("versine_over_square", pi * pi / 4, [](S x) { return versine_over_square(x); },
-        [](long double x) { return alternating_series(x, 2); });
-  check("exp_second", pi * pi, [](S x) { return exp_second(x); }, [](long double x) { return alternating_series(x, 3); });
-  check("alpha", pi * pi, [](S x) { return alpha(x); }, [](long double x) { return alpha_series(x, 0); });
-  check("alpha_slope", pi * pi, [](S x) { return alpha_slope(x); }, [](long double x) { return alpha_series(x, 1); });
-  check("alpha_curvature", pi * pi, [](S x) { return alpha_curvature(x); }, [](long double x) { return alpha_series(x, 2); });
+  check(
+      "atan_over_t", 1, [](S x) { return atan_over_t(x); }, atan_truth);
+  check(
+      "sinc", pi * pi / 4, [](S x) { return sinc(x); }, [](long double x) { return alternating_series(x, 1); });
+  check(
+      "versine_over_square", pi * pi / 4, [](S x) { return versine_over_square(x); },
+      [](long double x) { return alternating_series(x, 2); });
+  check(
+      "exp_second", pi * pi, [](S x) { return exp_second(x); }, [](long double x) { return alternating_series(x, 3); });
+  check(
+      "alpha", pi * pi, [](S x) { return alpha(x); }, [](long double x) { return alpha_series(x, 0); });
+  check(
+      "alpha_slope", pi * pi, [](S x) { return alpha_slope(x); }, [](long double x) { return alpha_series(x, 1); });
+  check(
+      "alpha_curvature", pi * pi, [](S x) { return alpha_curvature(x); },
+      [](long double x) { return alpha_series(x, 2); });
 }
 
 TEST_CASE("every polynomial is within two epsilon of its function over the whole range") { check_all<double>(2); }

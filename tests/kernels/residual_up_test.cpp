@@ -10,12 +10,16 @@
 namespace linden {
 namespace {
 
-const auto kernel = make_kernel([](auto& rig) { find_residual(rig); find_momenta(rig); },
-                                [](auto& rig) {
-                                  rig.result(0) = residual_up(rig.tree, rig.constants, rig.work.placement, rig.work.momentum_target,
-                                                              rig.work.impulse, rig.work.residual);
-                                },
-                                {"residual", "result"}, {"impulse"});
+const auto kernel = make_kernel(
+    [](auto& rig) {
+      find_residual(rig);
+      find_momenta(rig);
+    },
+    [](auto& rig) {
+      rig.result(0) = residual_up(rig.tree, rig.constants, rig.work.placement, rig.work.momentum_target,
+                                  rig.work.impulse, rig.work.residual);
+    },
+    {"residual", "result"}, {"impulse"});
 
 /// Three positions, the first two a step of `turn` apart, the last two another.
 struct Path {
@@ -57,7 +61,8 @@ TEST_CASE("h r without a target is the derivative of the discrete action by the 
   CHECK(worst < 1e-12);
 }
 
-TEST_CASE("h r is that of the paper's two-step equation, brute force and by its Algorithm 2, for small and large steps") {
+TEST_CASE(
+    "h r is that of the paper's two-step equation, brute force and by its Algorithm 2, for small and large steps") {
   double worst_action = 0, worst_literal = 0;
   for (const Model& model : mixed_trees()) {
     const PlainTree tree = reference::plain_tree(model);
@@ -72,7 +77,8 @@ TEST_CASE("h r is that of the paper's two-step equation, brute force and by its 
       fill(rig.work.delta, path.delta);
       place(rig);
       gravity_field_down(rig.tree, rig.work.placement, vec3(kGravity), rig.work.field);
-      gravity_force_up(rig.tree, rig.constants, rig.work.placement, rig.work.field, rig.work.first_moment, rig.work.force);
+      gravity_force_up(rig.tree, rig.constants, rig.work.placement, rig.work.field, rig.work.first_moment,
+                       rig.work.force);
       find_residual(rig);
       const VectorXd residual = vector(rig.work.residual);
       const VectorXd sum = p + reference::action_slope_at_begin(tree, path.now, path.next, h, kGravity);

@@ -1,10 +1,10 @@
 // tests/kernels/rig.hpp
-// Everything a sweep needs, for any Scalar: a tree, its fields, random inputs; and the proofs that hold for every sweep alike.
+// Everything a sweep needs, for any Scalar: a tree, its fields, random inputs; and the proofs that every sweep owes.
 //
 //   const auto kernel = make_kernel(prepare, run, {fields it writes}, {fields it changes in place});
 //   check_writes(kernel)             started from NaN every number is written, and nothing else is touched
 //   check_allocates_nothing(kernel)
-//   check_lanes(kernel)              the same instance has the same bits in every lane and any company, and agrees with the plain path
+//   check_lanes(kernel)              the same bits in every lane and any company, close to the plain path
 //
 // prepare(rig) and run(rig) are generic lambdas; a kernel's return value goes to rig.result.
 #pragma once
@@ -37,7 +37,7 @@ using Eigen::VectorXd;
 using reference::PlainBody;
 using reference::PlainTree;
 
-/// Random trees with joints of all kinds: deep, bushy, floating, with masses over six decades, and without free joints inside.
+/// Random trees with joints of all kinds: deep, bushy, floating, masses over six decades, no free joints inside.
 std::vector<Model> mixed_trees();
 
 /// What one instance starts from.
@@ -95,7 +95,9 @@ struct Rig {
   /// visit(name, field, rows) for every field.
   template <class Self, class Visit>
   static void each(Self& self, Visit&& visit) {
-    const auto named = [&](const char* name, auto& field, Rows rows, const char*) { visit(name, field, rows); };
+    const auto named = [&](const char* name, auto& field, Rows rows, const char*) {
+      visit(name, field, rows);
+    };
     State<S>::each(self.state, named);
     Workspace<S>::each(self.work, named);
     visit("rate", self.rate, Rows::velocities);
@@ -121,14 +123,16 @@ void displace(Rig<S>& rig) {
 template <class S>
 void find_momenta(Rig<S>& rig) {
   displace(rig);
-  momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist, rig.work.body_momentum, rig.work.impulse);
+  momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist, rig.work.body_momentum,
+               rig.work.impulse);
 }
 
 template <class S>
 void find_residual(Rig<S>& rig) {
   find_momenta(rig);
   momentum_target_map(rig.tree, rig.h, rig.state.p, rig.work.force, rig.work.momentum_target);
-  residual_up(rig.tree, rig.constants, rig.work.placement, rig.work.momentum_target, rig.work.impulse, rig.work.residual);
+  residual_up(rig.tree, rig.constants, rig.work.placement, rig.work.momentum_target, rig.work.impulse,
+              rig.work.residual);
 }
 
 template <class S>
@@ -167,7 +171,9 @@ inline VectorXd vector(const Field<double>& field) {
   return Eigen::Map<const VectorXd>(field.flat().data(), static_cast<Eigen::Index>(field.flat().size()));
 }
 
-inline void fill(Field<double>& field, const VectorXd& values) { std::copy(values.begin(), values.end(), field.flat().begin()); }
+inline void fill(Field<double>& field, const VectorXd& values) {
+  std::copy(values.begin(), values.end(), field.flat().begin());
+}
 
 /// Row i of a field as an Eigen vector or matrix.
 template <template <class> class Value, int Components>
@@ -183,7 +189,8 @@ struct Kernel {
 };
 
 template <class Prepare, class Run>
-Kernel<Prepare, Run> make_kernel(Prepare prepare, Run run, std::vector<std::string> writes, std::vector<std::string> changes = {}) {
+Kernel<Prepare, Run> make_kernel(Prepare prepare, Run run, std::vector<std::string> writes,
+                                 std::vector<std::string> changes = {}) {
   return {prepare, run, std::move(writes), std::move(changes)};
 }
 
@@ -204,7 +211,8 @@ void check_writes(const Kernel<Prepare, Run>& kernel) {
     Rig<double> before = rig;
     kernel.run(rig);
     std::vector<std::vector<double>> old;
-    Rig<double>::each(before, [&](const char*, auto& field, Rows) { old.emplace_back(field.flat().begin(), field.flat().end()); });
+    Rig<double>::each(
+        before, [&](const char*, auto& field, Rows) { old.emplace_back(field.flat().begin(), field.flat().end()); });
     std::size_t at = 0, outputs = 0;
     Rig<double>::each(rig, [&](const char* name, auto& field, Rows rows) {
       const std::vector<double>& was = old[at++];
@@ -253,13 +261,15 @@ void check_allocates_nothing(const Kernel<Prepare, Run>& kernel) {
   check_allocates_nothing_as<Pack>(kernel);
 }
 
-/// Behind newton_factor_up at steps of 2 rad: d may be small there, and rounding grows with the condition of what is eliminated.
+/// Behind newton_factor_up at steps of 2 rad: d may be small there, and rounding grows with the condition of what is
+/// eliminated.
 constexpr double kAfterElimination = 1e-10;
 
 /// `tolerance`: difference to the plain path, in units of the largest number of a field.
 template <class Prepare, class Run>
 void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {
-  const Model models[] = {random_tree({.bodies = 9, .seed = 21}), random_tree({.bodies = 9, .seed = 22, .frees = false})};
+  const Model models[] = {random_tree({.bodies = 9, .seed = 21}),
+                          random_tree({.bodies = 9, .seed = 22, .frees = false})};
   for (const Model& model : models) {
     const PlainTree tree = reference::plain_tree(model);
     constexpr std::size_t count = 2 * Pack::size + 1;
@@ -277,7 +287,9 @@ void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {
       });
     }
     for (std::size_t round = 0; round < 2 * count; ++round) {
-      const auto instance_in = [&](std::size_t l) { return (round + l * (round < count ? 1 : 2)) % count; };
+      const auto instance_in = [&](std::size_t l) {
+        return (round + l * (round < count ? 1 : 2)) % count;
+      };
       Rig<Pack> rig(model);
       for (std::size_t l = 0; l < Pack::size; ++l) rig.set(instances[instance_in(l)], l);
       kernel.prepare(rig);

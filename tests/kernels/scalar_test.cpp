@@ -31,7 +31,7 @@ TEST_CASE("the allocation counter counts") {
   CHECK(counter.count() == 0);
   // called by name: a new-expression whose result is not used may be left out
   ::operator delete(::operator new(8));
-  ::operator delete(::operator new(640, std::align_val_t{64}), std::align_val_t{64});
+  ::operator delete (::operator new (640, std::align_val_t{64}), std::align_val_t{64});
   CHECK(counter.count() == 2);
 }
 

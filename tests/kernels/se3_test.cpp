@@ -23,8 +23,8 @@ Vec3<S> rounded(const Vec3<double>& a) {
   return {static_cast<S>(a.x), static_cast<S>(a.y), static_cast<S>(a.z)};
 }
 
-/// Twists with angles over the whole range: every decade from 1e-300 (1e-30 in float), evenly up to pi, and as close to pi as `gap`.
-/// Shifts about as long as the angle, about 1, or anything between.
+/// Twists with angles over the whole range: every decade from 1e-300 (1e-30 in float), evenly up to pi, and as close to
+/// pi as `gap`. Shifts about as long as the angle, about 1, or anything between.
 template <class S>
 std::vector<Twist<S>> sample_twists(int count, double gap) {
   Random random(17);
@@ -61,7 +61,8 @@ class Worst {
   void see(const Vec3<S>& found, const Long3& truth, long double scale) {
     const long double error = (exact(found) - truth).norm();
     if (error == 0) return;
-    const auto epsilons = static_cast<double>(error / scale / static_cast<long double>(std::numeric_limits<S>::epsilon()));
+    const auto epsilons =
+        static_cast<double>(error / scale / static_cast<long double>(std::numeric_limits<S>::epsilon()));
     worst_ = std::isfinite(epsilons) ? std::max(worst_, epsilons) : std::numeric_limits<double>::infinity();
   }
   void see(const Vec3<S>& found, const Long3& truth) { see(found, truth, truth.norm()); }
@@ -81,7 +82,8 @@ struct LongDisplacement {
 };
 
 LongDisplacement long_exp(const Long6& u) {
-  return {reference::rotation_quaternion<long double>(u.head<3>()), reference::exp<long double>(u).topRightCorner<3, 1>()};
+  return {reference::rotation_quaternion<long double>(u.head<3>()),
+          reference::exp<long double>(u).topRightCorner<3, 1>()};
 }
 
 template <class S>
@@ -106,7 +108,8 @@ void check_log(double gap, double bound) {
     // a displacement as it is stored, rounded; its log exactly
     const LongDisplacement near = long_exp(exact(u));
     Displacement<S> D;
-    D.r = {{static_cast<S>(near.r[0]), static_cast<S>(near.r[1]), static_cast<S>(near.r[2])}, static_cast<S>(near.r[3])};
+    D.r = {{static_cast<S>(near.r[0]), static_cast<S>(near.r[1]), static_cast<S>(near.r[2])},
+           static_cast<S>(near.r[3])};
     D.p = {static_cast<S>(near.p[0]), static_cast<S>(near.p[1]), static_cast<S>(near.p[2])};
     Long4 r;
     r << exact(D.r.v), static_cast<long double>(D.r.w);
@@ -156,7 +159,9 @@ void check_dlog(double gap, double bound) {
 
 TEST_CASE("exp has relative errors of a few epsilon from 1e-300 to pi - 1e-9") { check_exp<double>(1e-9, 6); }
 TEST_CASE("log has relative errors of a few epsilon from 1e-300 to pi - 1e-9") { check_log<double>(1e-9, 6); }
-TEST_CASE("dlog and its transpose have relative errors of a few epsilon from 1e-300 to pi - 1e-9") { check_dlog<double>(1e-9, 5); }
+TEST_CASE("dlog and its transpose have relative errors of a few epsilon from 1e-300 to pi - 1e-9") {
+  check_dlog<double>(1e-9, 5);
+}
 
 TEST_CASE("exp has relative errors of a few epsilon in float") { check_exp<float>(1e-6, 6); }
 TEST_CASE("log has relative errors of a few epsilon in float") { check_log<float>(1e-6, 6); }
@@ -232,7 +237,9 @@ TEST_CASE("dlog at a pure shift is I - 1/2 ad and a wrench carried to the step's
 /// h mu of a pose at k+1 that is changed by eta, in dual numbers: the six columns of K.
 reference::Matrix6<double> varied_momentum(const Inertia<double>& G, const Twist<double>& u) {
   using T = Dual<6>;
-  const auto wide = [](const Vec3<double>& a) { return Vec3<T>{a.x, a.y, a.z}; };
+  const auto wide = [](const Vec3<double>& a) {
+    return Vec3<T>{a.x, a.y, a.z};
+  };
   const Inertia<T> wide_G{G.m, wide(G.mc), G.xx, G.xy, G.xz, G.yy, G.yz, G.zz};
   const Twist<T> eta{{T(0, 0), T(0, 1), T(0, 2)}, {T(0, 3), T(0, 4), T(0, 5)}};
   const Twist<T> moved = log(exp(Twist<T>{wide(u.w), wide(u.v)}) * exp(eta));
@@ -288,7 +295,8 @@ TEST_CASE("pose_derivative at rest is the inertia, and to first order what the p
     const Twist<double> u = random_twist(random, size);
     const reference::Matrix6<double> ad = reference::ad<double>(eigen(u)), inertia = eigen(G);
     reference::Matrix6<double> swapped;
-    for (int k = 0; k < 6; ++k) swapped.col(k) = reference::ad<double>(reference::Vector6<double>::Unit(k)).transpose() * eigen(G * u);
+    for (int k = 0; k < 6; ++k)
+      swapped.col(k) = reference::ad<double>(reference::Vector6<double>::Unit(k)).transpose() * eigen(G * u);
     const reference::Matrix6<double> first = 0.5 * (inertia * ad - ad.transpose() * inertia - swapped);
     const reference::Matrix6<double> K = eigen(pose_derivative(G, u, G * u));
     CHECK((K - inertia - first).norm() < 4 * size * size * inertia.norm());

@@ -19,7 +19,8 @@ std::array<double, N * N> random_block(Random& random) {
   for (double& value : root.reshaped()) value = random.uniform(-1, 1);
   for (double& value : skew.reshaped()) value = random.uniform(-0.3, 0.3);
   std::array<double, N * N> block;
-  Eigen::Map<Matrix<N>>(block.data()) = root * root.transpose() + 0.01 * Matrix<N>::Identity() + skew - skew.transpose();
+  Eigen::Map<Matrix<N>>(block.data()) =
+      root * root.transpose() + 0.01 * Matrix<N>::Identity() + skew - skew.transpose();
   return block;
 }
 
@@ -52,7 +53,8 @@ TEST_CASE("invert knows the inverse of a shear and of a scaling") {
   std::array<double, 36> scaling{};
   for (std::size_t k = 0; k < 6; ++k) scaling[7 * k] = std::ldexp(1.0, static_cast<int>(k));
   invert<6>(scaling);
-  for (std::size_t k = 0; k < 36; ++k) CHECK(scaling[k] == (k % 7 == 0 ? std::ldexp(1.0, -static_cast<int>(k / 7)) : 0.0));
+  for (std::size_t k = 0; k < 36; ++k)
+    CHECK(scaling[k] == (k % 7 == 0 ? std::ldexp(1.0, -static_cast<int>(k / 7)) : 0.0));
 }
 
 TEST_CASE("invert of a singular block is not finite") {

@@ -63,7 +63,8 @@ TEST_CASE("quaternions turn and multiply as their matrices do") {
   for (int sample = 0; sample < 20; ++sample) {
     const Quaternion<double> a = random_quaternion(random), b = random_quaternion(random);
     const Vec3<double> v = random_vec3(random, 1);
-    const Eigen::Matrix3d A = reference::rotation_matrix<double>(eigen(a)), B = reference::rotation_matrix<double>(eigen(b));
+    const Eigen::Matrix3d A = reference::rotation_matrix<double>(eigen(a)),
+                          B = reference::rotation_matrix<double>(eigen(b));
     check_equal(eigen(rotation(a)), A);
     check_equal(eigen(rotate(a, v)), A * eigen(v));
     check_equal(eigen(rotation(a * b)), A * B);
@@ -154,9 +155,12 @@ TEST_CASE("spatial operations give equal bits in every lane and allocate nothing
   Random random(6);
   std::vector<std::array<double, 31>> samples;
   for (std::size_t k = 0; k < 2 * Pack::size + 1; ++k) {
+    const Placement<double> X = random_placement(random);
+    const Displacement<double> D = random_displacement(random);
     const Twist<double> V = random_twist(random, 1);
-    samples.push_back(joined(numbers_of<double>(random_placement(random)), numbers_of<double>(random_displacement(random)),
-                             numbers_of<double>(V), numbers_of<double>(random_wrench(random, 1))));
+    const Wrench<double> F = random_wrench(random, 1);
+    samples.push_back(
+        joined(numbers_of<double>(X), numbers_of<double>(D), numbers_of<double>(V), numbers_of<double>(F)));
   }
   check_value_lanes(
       [](const auto& in) {

@@ -94,9 +94,13 @@ inline Vec3<double> random_direction(Random& random, double length) {
   return vec3(length * (random.rotation() * Eigen::Vector3d::UnitX()));
 }
 
-inline Twist<double> random_twist(Random& random, double size) { return {random_vec3(random, size), random_vec3(random, size)}; }
+inline Twist<double> random_twist(Random& random, double size) {
+  return {random_vec3(random, size), random_vec3(random, size)};
+}
 
-inline Wrench<double> random_wrench(Random& random, double size) { return {random_vec3(random, size), random_vec3(random, size)}; }
+inline Wrench<double> random_wrench(Random& random, double size) {
+  return {random_vec3(random, size), random_vec3(random, size)};
+}
 
 inline Quaternion<double> random_quaternion(Random& random) {
   const Eigen::Quaterniond q = random.rotation();
@@ -107,15 +111,18 @@ inline Placement<double> random_placement(Random& random) {
   return {mat3(random.rotation().toRotationMatrix()), random_vec3(random, 1)};
 }
 
-inline Displacement<double> random_displacement(Random& random) { return {random_quaternion(random), random_vec3(random, 1)}; }
+inline Displacement<double> random_displacement(Random& random) {
+  return {random_quaternion(random), random_vec3(random, 1)};
+}
 
 /// Inertia of a body: three masses on random axes, away from the centre.
 inline Inertia<double> random_inertia(Random& random) {
   const double mass = random.uniform(0.5, 2);
   const Eigen::Vector3d center = eigen(random_vec3(random, 0.5));
-  const Eigen::Vector3d spread(random.uniform(0.1, 0.5), random.uniform(0.1, 0.5), random.uniform(0.1, 0.5));
+  const Eigen::Vector3d spread = eigen(random_vec3(random, 0.2)) + Eigen::Vector3d::Constant(0.3);
   const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
-  const Eigen::Matrix3d second = mass * (turn * spread.cwiseAbs2().asDiagonal() * turn.transpose() + center * center.transpose());
+  const Eigen::Matrix3d second =
+      mass * (turn * spread.cwiseAbs2().asDiagonal() * turn.transpose() + center * center.transpose());
   const Eigen::Matrix3d about = second.trace() * Eigen::Matrix3d::Identity() - second;
   return {mass, vec3(mass * center), about(0, 0), about(0, 1), about(0, 2), about(1, 1), about(1, 2), about(2, 2)};
 }

@@ -8,22 +8,27 @@
 namespace linden {
 namespace {
 
-const auto velocities = make_kernel([](auto& rig) { place(rig); },
-                                    [](auto& rig) {
-                                      velocity_down(rig.tree, rig.constants, rig.work.placement, rig.rate, rig.work.twist);
-                                    },
-                                    {"twist"});
+const auto velocities = make_kernel(
+    [](auto& rig) { place(rig); },
+    [](auto& rig) { velocity_down(rig.tree, rig.constants, rig.work.placement, rig.rate, rig.work.twist); }, {"twist"});
 
-const auto momenta = make_kernel([](auto& rig) { place(rig); velocities.run(rig); },
-                                 [](auto& rig) { momentum_of_map(rig.tree, rig.constants, rig.work.twist, rig.work.impulse); },
-                                 {"impulse"});
+const auto momenta = make_kernel(
+    [](auto& rig) {
+      place(rig);
+      velocities.run(rig);
+    },
+    [](auto& rig) { momentum_of_map(rig.tree, rig.constants, rig.work.twist, rig.work.impulse); }, {"impulse"});
 
-const auto coriolis = make_kernel([](auto& rig) { place(rig); velocities.run(rig); },
-                                  [](auto& rig) {
-                                    coriolis_down(rig.tree, rig.constants, rig.work.placement, rig.rate, rig.work.twist,
-                                                  rig.work.body_momentum, rig.work.impulse);
-                                  },
-                                  {"body_momentum", "impulse"});
+const auto coriolis = make_kernel(
+    [](auto& rig) {
+      place(rig);
+      velocities.run(rig);
+    },
+    [](auto& rig) {
+      coriolis_down(rig.tree, rig.constants, rig.work.placement, rig.rate, rig.work.twist, rig.work.body_momentum,
+                    rig.work.impulse);
+    },
+    {"body_momentum", "impulse"});
 
 TEST_CASE("velocity_down is the Jacobian of every body times the rates") {
   double worst = 0;

@@ -3,8 +3,8 @@
 //
 //   c = M' v - dK/dq - ad_v^T p           M' along v, K = 1/2 v.M v, p = M v: M v' + c = Q
 //
-// The last term is there because the velocities of ball and free joints are twists in the body's frame, not rates of coordinates
-// (Euler-Poincare): it is w x p for a ball joint, (w x n + v x f, w x f) for a free one, nothing for a screw.
+// The last term is there because the velocities of ball and free joints are twists in the body's frame, not rates of
+// coordinates (Euler-Poincare): w x p for a ball joint, (w x n + v x f, w x f) for a free one, nothing for a screw.
 #pragma once
 
 #include "tests/reference/mass_matrix_plain.hpp"

@@ -22,7 +22,8 @@ struct StepMomenta {
 
 /// Lines 1 to 5 and 7: from q to q_next, the latter varied by eps.
 template <class T>
-StepMomenta<T> step_momenta(const PlainTree& tree, const VectorXd& q, const VectorXd& q_next, const VectorX<T>& eps, double h) {
+StepMomenta<T> step_momenta(const PlainTree& tree, const VectorXd& q, const VectorXd& q_next, const VectorX<T>& eps,
+                            double h) {
   const VectorX<T> none = VectorX<T>::Zero(tree.velocities);
   std::vector<Matrix4<T>> dT(tree.bodies.size(), Matrix4<T>::Identity());
   StepMomenta<T> result;
@@ -57,7 +58,8 @@ VectorX<T> del_residual(const PlainTree& tree, const VectorXd& q_before, const V
     F[i] += now.mu[i] - left_over.template cast<T>() - external.template cast<T>();
     f.segment(body.v, body.dofs()) = body.S.transpose().template cast<T>() * F[i];
     const Matrix4<double> X = joint_pose<double>(body, q, VectorXd::Zero(tree.velocities));
-    F[static_cast<std::size_t>(body.parent)] += adjoint<double>(inverse<double>(X)).transpose().template cast<T>() * F[i];
+    F[static_cast<std::size_t>(body.parent)] +=
+        adjoint<double>(inverse<double>(X)).transpose().template cast<T>() * F[i];
   }
   return f;
 }

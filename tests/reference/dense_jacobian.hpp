@@ -1,6 +1,6 @@
 // tests/reference/dense_jacobian.hpp
-// The derivative of h r(delta) as a dense matrix: the kernels themselves, run on dual numbers. Its own twin, Algorithm 2 in plain matrices,
-// is dense_jacobian_plain.hpp.
+// The derivative of h r(delta) as a dense matrix: the kernels themselves, run on dual numbers. Its own twin, Algorithm
+// 2 in plain matrices, is dense_jacobian_plain.hpp.
 //
 // Column j is the change of h r when coordinate j of the step's motion varies from the right, M <- M exp(S Delta).
 #pragma once

@@ -4,8 +4,9 @@
 //   L_d(q^k, q^k+1) = sum over bodies of  h/2 L(T^k, V) + h/2 L(T^k+1, V),   L = 1/2 V.G V - P(T)     (6), (9)
 //   V = 1/h log((T^k)^-1 T^k+1),  P = -m g.c                                                         (10)
 //
-// Every body is placed in the world by forward kinematics, at both ends of the step; no sweep, no displacement is handed from parent to
-// child, and no formula for a derivative is used. D1 and D2 are with respect to a variation of each joint's pose from the right.
+// Every body is placed in the world by forward kinematics, at both ends of the step; no displacement is handed from
+// parent to child, and no formula for a derivative is used. D1 and D2 are with respect to a variation of each joint's
+// pose from the right.
 #pragma once
 
 #include "tests/reference/plain_tree.hpp"
@@ -27,8 +28,8 @@ T potential(const PlainTree& tree, const std::vector<Matrix4<T>>& pose, const Ve
 
 /// L_d of a step from poses `begin` to poses `end`.
 template <class T>
-T discrete_lagrangian(const PlainTree& tree, const std::vector<Matrix4<T>>& begin, const std::vector<Matrix4<T>>& end, double h,
-                      const Vector3<double>& gravity) {
+T discrete_lagrangian(const PlainTree& tree, const std::vector<Matrix4<T>>& begin, const std::vector<Matrix4<T>>& end,
+                      double h, const Vector3<double>& gravity) {
   T kinetic(0.0);
   for (std::size_t i = 1; i < begin.size(); ++i) {
     const Vector6<T> V = log<T>(inverse<T>(begin[i]) * end[i]) / T(h);
@@ -58,9 +59,8 @@ inline VectorXd action_slope_at_end(const PlainTree& tree, const VectorXd& q_bef
 
 /// Q = -dP/dq [nv].
 inline VectorXd potential_force(const PlainTree& tree, const VectorXd& q, const Vector3<double>& gravity) {
-  return -gradient(tree.velocities, [&](const auto& eps) {
-    return potential<Dual<8>>(tree, poses<Dual<8>>(tree, q, eps), gravity);
-  });
+  return -gradient(tree.velocities,
+                   [&](const auto& eps) { return potential<Dual<8>>(tree, poses<Dual<8>>(tree, q, eps), gravity); });
 }
 
 }  // namespace linden::reference

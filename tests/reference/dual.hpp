@@ -86,12 +86,12 @@ struct Dual {
   }
 };
 
-/// The value without its derivatives.
-inline double value(double x) { return x; }
-inline long double value(long double x) { return x; }
+/// Zero, and not about to change.
+inline bool vanishes(double x) { return x == 0; }
+inline bool vanishes(long double x) { return x == 0; }
 template <int N>
-double value(const Dual<N>& x) {
-  return x.value;
+bool vanishes(const Dual<N>& x) {
+  return x.value == 0 && x.slope == std::array<double, static_cast<std::size_t>(N)>{};
 }
 
 }  // namespace linden::reference
@@ -104,7 +104,15 @@ struct NumTraits<linden::reference::Dual<N>> : NumTraits<double> {
   using NonInteger = linden::reference::Dual<N>;
   using Nested = linden::reference::Dual<N>;
   using Literal = linden::reference::Dual<N>;
-  enum { IsComplex = 0, IsInteger = 0, IsSigned = 1, RequireInitialization = 1, ReadCost = 1, AddCost = N + 1, MulCost = 3 * N };
+  enum {
+    IsComplex = 0,
+    IsInteger = 0,
+    IsSigned = 1,
+    RequireInitialization = 1,
+    ReadCost = 1,
+    AddCost = N + 1,
+    MulCost = 3 * N
+  };
 };
 
 }  // namespace Eigen

@@ -1,5 +1,5 @@
 // tests/reference/elimination_plain.hpp
-// Gaussian elimination of a dense matrix joint by joint, leaves first: what the O(n) factorisations do without ever forming it.
+// Gaussian elimination of a dense matrix joint by joint, leaves first: what the O(n) factorisations do without it.
 //
 //   A <- A - A_:i d^-1 A_i:,   r <- r - A_:i d^-1 r_i,   d = A_ii at the time
 #pragma once

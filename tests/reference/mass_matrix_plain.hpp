@@ -1,7 +1,7 @@
 // tests/reference/mass_matrix_plain.hpp
 // The mass matrix from the Jacobian of every body.
 //
-//   M(q) = sum over bodies of J_i^T G_i J_i,   column of joint a in J_i: Ad_{T_i^-1 T_a} S_a for a above or at i, else 0
+//   M(q) = sum over bodies of J_i^T G_i J_i,   columns of joint a in J_i: Ad_{T_i^-1 T_a} S_a for a above or at i
 #pragma once
 
 #include "tests/reference/plain_tree.hpp"
@@ -21,7 +21,8 @@ Eigen::Matrix<T, 6, Eigen::Dynamic> body_jacobian(const PlainTree& tree, const s
 }
 
 template <class T>
-Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic> mass_matrix(const PlainTree& tree, const std::vector<Matrix4<T>>& pose) {
+Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic> mass_matrix(const PlainTree& tree,
+                                                             const std::vector<Matrix4<T>>& pose) {
   Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic> M;
   M.setZero(tree.velocities, tree.velocities);
   for (Index i = 1; i < tree.slots(); ++i) {
@@ -31,6 +32,8 @@ Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic> mass_matrix(const PlainTree& tr
   return M;
 }
 
-inline MatrixXd mass_matrix(const PlainTree& tree, const VectorXd& q) { return mass_matrix<double>(tree, poses(tree, q)); }
+inline MatrixXd mass_matrix(const PlainTree& tree, const VectorXd& q) {
+  return mass_matrix<double>(tree, poses(tree, q));
+}
 
 }  // namespace linden::reference

@@ -2,7 +2,8 @@
 // A tree as the other plain twins see it: one struct a body, 4 x 4 poses, 6 x 6 inertias, positions as one vector.
 //
 // Indices are slots; body 0 is the world. A variation eps [nv] multiplies each joint's pose from the right,
-// T_lambda(i),i <- T_lambda(i),i exp([S_i eps_i]): for a screw q + eps, for ball and free joints a twist in the body's frame.
+// T_lambda(i),i <- T_lambda(i),i exp([S_i eps_i]): for a screw q + eps, for ball and free joints a twist in the body's
+// frame.
 #pragma once
 
 #include <Eigen/Dense>
@@ -19,11 +20,11 @@ using Eigen::VectorXd;
 struct PlainBody {
   Index parent = 0;
   JointKind kind = JointKind::screw;
-  double turn = 0, shift = 0;                            // of a screw, per unit of q
+  double turn = 0, shift = 0;                               // of a screw, per unit of q
   Matrix4<double> placement = Matrix4<double>::Identity();  // at q = 0, child -> parent
   Matrix6<double> G = Matrix6<double>::Zero();              // inertia about the frame's origin (7)
-  Eigen::Matrix<double, 6, Eigen::Dynamic> S;            // joint Jacobian, body frame
-  Index q = 0, v = 0;                                    // first rows
+  Eigen::Matrix<double, 6, Eigen::Dynamic> S;               // joint Jacobian, body frame
+  Index q = 0, v = 0;                                       // first rows
 
   double mass() const { return G(3, 3); }
   /// Mass times centre of mass, body frame.
@@ -53,10 +54,13 @@ inline PlainTree plain_tree(const Model& model) {
     body.q = model.tree.first_q(i);
     body.v = model.tree.first_v(i);
     for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) body.placement(row, column) = model.constants.tree_placement(i, 3 * row + column);
+      for (int column = 0; column < 3; ++column)
+        body.placement(row, column) = model.constants.tree_placement(i, 3 * row + column);
       body.placement(row, 3) = model.constants.tree_placement(i, 9 + row);
     }
-    const auto g = [&](int k) { return model.constants.inertia(i, k); };
+    const auto g = [&](int k) {
+      return model.constants.inertia(i, k);
+    };
     Matrix3<double> rotational;
     rotational << g(4), g(5), g(6), g(5), g(7), g(8), g(6), g(8), g(9);
     const Matrix3<double> C = hat<double>({g(1), g(2), g(3)});
@@ -83,7 +87,9 @@ Matrix4<T> joint_pose(const PlainBody& body, const VectorXd& q, const VectorX<T>
       own(2, 3) = body.shift * q[body.q];
       break;
     }
-    case JointKind::ball: own.topLeftCorner<3, 3>() = rotation_matrix<double>(q.segment<4>(body.q)); break;
+    case JointKind::ball:
+      own.topLeftCorner<3, 3>() = rotation_matrix<double>(q.segment<4>(body.q));
+      break;
     case JointKind::free:
       own.topLeftCorner<3, 3>() = rotation_matrix<double>(q.segment<4>(body.q + 3));
       own.topRightCorner<3, 1>() = q.segment<3>(body.q);
@@ -159,7 +165,8 @@ MatrixXd jacobian(Index directions, Function&& f) {
     const VectorX<Dual<8>> y = f(eps);
     result.conservativeResize(y.size(), directions);
     for (Index k = 0; k < count; ++k) {
-      for (Eigen::Index row = 0; row < y.size(); ++row) result(row, first + k) = y[row].slope[static_cast<std::size_t>(k)];
+      for (Eigen::Index row = 0; row < y.size(); ++row)
+        result(row, first + k) = y[row].slope[static_cast<std::size_t>(k)];
     }
   });
   return result;
