@@ -97,9 +97,8 @@ struct Rig {
     rate_down(model.tree, model.constants, work.placement, gains(), work.innovation, work.variation, work.increment);
   }
   void correction() { correct_motion_map(model.tree, model.constants, work.increment, 0.0, work.delta, work.motion); }
-  void end_momentum() { end_momentum_map(model.tree, work.twist, work.body_momentum, work.impulse); }
   void update() {
-    momentum_update_map(model.tree, kStep, work.displacement, work.increment, work.residual, work.force, state.p);
+    momentum_update_map(model.tree, model.constants, kStep, work.displacement, work.impulse, work.residual, work.force, state.p);
   }
   void advance() { advance_map(model.tree, work.motion, work.delta, state.q); }
 };
@@ -138,7 +137,6 @@ const std::vector<Named> kKernels{
     {"increment_down", {&Rig::increment}},
     {"rate_down", {&Rig::rates}},
     {"correct_motion_map", {&Rig::correction}},
-    {"end_momentum_map", {&Rig::end_momentum}},
     {"momentum_update_map", {&Rig::update}},
     {"advance_map", {&Rig::advance}},
     {"velocity_down", {&Rig::velocity}},

@@ -18,6 +18,7 @@
 
 #include "engine/inspect.hpp"
 #include "engine/load_model.hpp"
+#include "engine/rollout_command.hpp"
 #include "engine/run_command.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -28,7 +29,7 @@ namespace {
 
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
-  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread;
+  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -54,20 +55,35 @@ void read_model_options(const Texts& texts, std::optional<Base>& base, Options& 
   if (!texts.solver.empty()) options.solver = solver_from(texts.solver);
 }
 
-void read_run_options(const Texts& texts, RunArguments& run) {
-  read_model_options(texts, run.base, run.options);
-  if (!texts.duration.empty()) run.duration = number_from("--duration", texts.duration, "seconds, such as 10");
-  if (!texts.dt.empty()) run.options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
-  if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
-  if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
-  if (!texts.tolerance.empty()) run.options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
-  if (!texts.order.empty() && texts.order != "2") throw InputError(fmt::format("--order {}: only order 2 exists", texts.order));
+void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
+  read_model_options(texts, motion.base, options);
+  if (!texts.duration.empty()) motion.duration = number_from("--duration", texts.duration, "seconds, such as 10");
+  if (!texts.dt.empty()) options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
+  if (!texts.tolerance.empty()) options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
   if (!texts.seed.empty()) {
     const std::int64_t seed = integer_from("--seed", texts.seed, "a whole number, zero or more");
     if (seed < 0) throw InputError(fmt::format("--seed {}: expected a whole number, zero or more", seed));
-    run.seed = static_cast<std::uint64_t>(seed);
+    motion.seed = static_cast<std::uint64_t>(seed);
   }
-  if (!texts.spread.empty()) run.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
+  if (!texts.spread.empty()) motion.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
+}
+
+void read_run_options(const Texts& texts, RunArguments& run) {
+  read_motion_options(texts, run, run.options);
+  if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
+  if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
+  if (!texts.order.empty() && texts.order != "2") throw InputError(fmt::format("--order {}: only order 2 exists", texts.order));
+}
+
+void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
+  read_motion_options(texts, rollout, rollout.options);
+  if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
+  if (!texts.every.empty()) rollout.every = integer_from("--every", texts.every, "steps between frames, such as 10");
+  if (!texts.threads.empty()) {
+    const std::int64_t threads = integer_from("--threads", texts.threads, "how many, such as 8; 0 for all there are");
+    rollout.options.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
+  }
+  if (!texts.instructions.empty()) rollout.options.instructions = instructions_from(texts.instructions);
 }
 
 constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N";
@@ -99,6 +115,35 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
       "Examples:\n"
       "  linden run models/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --plot energy.png\n"
       "  linden run chain:100 --duration 5 --dt 1e-3 --record chain.csv --json chain.json");
+  return command;
+}
+
+CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout) {
+  CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model at once.");
+  command->add_option("MODEL", rollout.model, kModelHelp)->required()->option_text(" ");
+  const auto add = [&](const char* group, const char* name, std::string& text, const char* value, const char* meaning) {
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
+  };
+  add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
+  add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
+  add("Instances", "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  add("Motion", "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
+  add("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10");
+  add("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3");
+  add("Motion", "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10; single precision stops at 3e-6");
+  command->add_flag("--float", rollout.single, "single precision: twice as fast, half the memory")->group("Method");
+  add("Processor", "--threads", texts.threads, "T", "default: all there are; results do not depend on it");
+  add("Processor", "--instructions", texts.instructions, "NAME", "scalar, baseline, avx2 or avx512; default: the best there is");
+  add("Output", "--record", rollout.record, "FILE.npz|h5", "time, q, v, energy and status of all instances");
+  add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
+  add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
+  command->footer(
+      "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C ends a rollout early\n"
+      "and keeps its files.\n\n"
+      "Examples:\n"
+      "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
+      "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10");
   return command;
 }
 
@@ -149,13 +194,16 @@ int run_program(int argc, char** argv) {
   program.set_version_flag("--version", fmt::format("linden {}", kVersion));
   program.footer("Examples:\n"
                  "  linden run chain:100 --duration 5 --plot energy.png\n"
+                 "  linden rollout models/humanoid.urdf --base floating --instances 4096 --duration 1\n"
                  "  linden inspect models/humanoid.urdf --base floating\n\n"
                  "linden COMMAND --help says more.");
   program.get_formatter()->column_width(30);
   Texts texts;
   RunArguments run_arguments;
+  RolloutArguments rollout_arguments;
   InspectArguments inspect_arguments;
   const CLI::App* run = add_run(program, texts, run_arguments);
+  const CLI::App* rollout = add_rollout(program, texts, rollout_arguments);
   const CLI::App* inspection = add_inspect(program, texts, inspect_arguments);
   program.allow_extras();
   for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->allow_extras();
@@ -168,7 +216,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
     std::string help = "linden";
-    for (const CLI::App* command : {run, inspection}) {
+    for (const CLI::App* command : {run, rollout, inspection}) {
       if (!command->parsed()) continue;
       help = "linden " + command->get_name();
       refuse_leftovers(*command, help);
@@ -181,12 +229,17 @@ int run_program(int argc, char** argv) {
     read_run_options(texts, run_arguments);
     return run_command(run_arguments);
   }
+  if (rollout->parsed()) {
+    refuse_leftovers(*rollout, "linden rollout");
+    read_rollout_options(texts, rollout_arguments);
+    return rollout_command(rollout_arguments);
+  }
   if (inspection->parsed()) {
     refuse_leftovers(*inspection, "linden inspect");
     read_model_options(texts, inspect_arguments.base, inspect_arguments.options);
     return inspect(inspect_arguments);
   }
-  throw InputError("no command given; choose run or inspect; linden --help says more");
+  throw InputError("no command given; choose run, rollout or inspect; linden --help says more");
 }
 
 int complain(std::string_view message, int exit_code) {

@@ -10,7 +10,6 @@
 #include <stdexcept>
 #include <system_error>
 #include <utility>
-#include <utility>
 
 #include "layout/input_error.hpp"
 

@@ -26,23 +26,9 @@ namespace {
 
 using Clock = Progress::Clock;
 
-constexpr double kMostSteps = 1e12;
 constexpr std::int64_t kSamples = 20'000;
 
 double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
-
-std::int64_t step_count(double duration, double step) {
-  // a duration that misses a whole number of steps by rounding is that whole number
-  constexpr double kSlack = 1e-9;
-  if (!std::isfinite(duration) || !(duration >= step * (1 - kSlack))) {
-    throw InputError(fmt::format("--duration {}: expected a finite number of seconds, at least one step ({} s)", duration, step));
-  }
-  if (duration / step > kMostSteps) {
-    throw InputError(fmt::format("--duration {} s in steps of {} s makes {:.3g} steps; at most {:.0e} can be taken", duration, step,
-                                 duration / step, kMostSteps));
-  }
-  return std::llround(duration / step);
-}
 
 /// Whether the file holds something that is no checkpoint: a slip of the hand should not cost anyone a file.
 bool holds_something_else(const std::string& file) {
@@ -79,9 +65,6 @@ void check_outputs(const RunArguments& arguments) {
 }
 
 void check_start(const RunArguments& arguments) {
-  if (arguments.spread && !(std::isfinite(*arguments.spread) && *arguments.spread >= 0)) {
-    throw InputError(fmt::format("--spread {}: expected a finite number, zero or more", *arguments.spread));
-  }
   if (!arguments.load.empty() && randomness(arguments)) {
     throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
   }
@@ -210,7 +193,7 @@ std::string ending(const Execution& run, const RunFigures& figures, const Option
 int run_command(const RunArguments& arguments) {
   const Clock::time_point begin = Clock::now();
   check(arguments.options);
-  const std::int64_t steps = step_count(arguments.duration, arguments.options.step);
+  const std::int64_t steps = step_count(arguments, arguments.options.step);
   check_start(arguments);
   check_outputs(arguments);
 

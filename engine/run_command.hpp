@@ -7,22 +7,14 @@
 //   writes    files appear whole or not at all. A run that fails or is interrupted leaves them valid up to its last good step.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <string>
 
-#include "engine/options.hpp"
-#include "layout/urdf.hpp"
+#include "engine/motion_arguments.hpp"
 
 namespace linden {
 
-struct RunArguments {
-  std::string model;
-  std::optional<Base> base;
-  double duration = 10;  // [s]
+struct RunArguments : MotionArguments {
   Options options;
-  std::optional<std::uint64_t> seed;
-  std::optional<double> spread;
   std::string record, json, plot, save, load;  // files; empty = none
 };
 

@@ -13,40 +13,6 @@
 namespace linden {
 namespace {
 
-constexpr std::uint64_t kDefaultSeed = 1;
-constexpr double kDefaultSpread = 0.1;
-
-/// What the file says of its joints and no run obeys.
-struct LeftOut {
-  int limits = 0, damping = 0, friction = 0;
-  explicit LeftOut(const Model& model) {
-    for (Index slot = 1; slot < model.tree.shape.slots; ++slot) {
-      const Index row = model.tree.first_v(slot);
-      limits += std::isfinite(model.attributes.lower(row)) || std::isfinite(model.attributes.upper(row)) ? 1 : 0;
-      damping += model.attributes.damping(row) > 0 ? 1 : 0;
-      friction += model.attributes.friction(row) > 0 ? 1 : 0;
-    }
-  }
-  std::string text() const {
-    std::vector<std::string> parts;
-    if (limits > 0) parts.push_back(fmt::format("limits of {}", counted(limits, "joint")));
-    if (damping > 0) parts.push_back(fmt::format("damping of {}", damping));
-    if (friction > 0) parts.push_back(fmt::format("friction of {}", friction));
-    return fmt::format("{}", fmt::join(parts, ", "));
-  }
-};
-
-std::string model_text(const RunArguments& arguments, const Model& model) {
-  return model.names.model.starts_with(arguments.model) ? printable(model.names.model)
-                                                        : printable(fmt::format("{} ({})", model.names.model, arguments.model));
-}
-
-std::string gravity_text(const Options& options) {
-  const auto& g = options.gravity;
-  if (g == std::array<double, 3>{0, 0, 0}) return "no gravity";
-  return fmt::format("gravity {:g} {:g} {:g} m/s^2", g[0], g[1], g[2]);
-}
-
 std::string start_text(const RunArguments& arguments, const RunFigures& figures) {
   if (!arguments.load.empty()) return fmt::format("{}, at {:.6g} s", arguments.load, figures.begin);
   if (const auto random = randomness(arguments)) {
@@ -67,11 +33,6 @@ std::string plural(std::int64_t number, const char* one, const char* more) { ret
 
 }  // namespace
 
-std::optional<Randomness> randomness(const RunArguments& arguments) {
-  if (!arguments.seed && !arguments.spread) return std::nullopt;
-  return Randomness{arguments.seed.value_or(kDefaultSeed), arguments.spread.value_or(kDefaultSpread)};
-}
-
 std::string energy_advice(const Options& options, const EnergyDrift& energy) {
   constexpr double kTooFar = 0.05, kRounding = 1e-9;
   if (!(energy.band() > kTooFar * energy.scale()) || energy.band() <= kRounding * std::abs(energy.initial())) return "";
@@ -85,9 +46,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   std::string text;
   const auto row = [&](const char* label, const std::string& value) { text += fmt::format("{:<11} {}\n", label, value); };
 
-  row("model", fmt::format("{}: {}, {}, {:.5g} kg, {}", model_text(arguments, model), counted(model.tree.bodies(), "body"),
-                           counted(model.degrees_of_freedom(), "degree") + " of freedom", model.constants.subtree_mass(0),
-                           base_of(model)));
+  row("model", model_text(arguments, model));
   row("start", start_text(arguments, figures));
   if (const std::string left_out = LeftOut(model).text(); !left_out.empty()) row("ignored", left_out + "; runs know gravity only");
   row("method", fmt::format("{}, step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), options.step,

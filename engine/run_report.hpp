@@ -34,13 +34,6 @@ struct RunFigures {
   double simulated(double step) const { return static_cast<double>(steps) * step; }
 };
 
-/// Seed and spread as they were used; nothing where the run did not start at random.
-struct Randomness {
-  std::uint64_t seed;
-  double spread;
-};
-std::optional<Randomness> randomness(const RunArguments& arguments);
-
 /// What to say of a run whose energy strays so far that the motion cannot be trusted; empty for others.
 std::string energy_advice(const Options& options, const EnergyDrift& energy);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/instance_stepper.hpp"
 #include "layout/input_error.hpp"
 
 namespace linden {
@@ -41,28 +42,10 @@ std::vector<double> Simulation::velocities() {
 
 void Simulation::set_positions(std::span<const double> q) {
   check_row_count("positions", q.size(), model_->tree.shape.positions);
-  for (std::size_t i = 0; i < q.size(); ++i) {
-    if (!std::isfinite(q[i])) throw InputError(fmt::format("position \"{}\" is {}", model_->names.position[i], q[i]));
-  }
-  const Tree& tree = model_->tree;
   std::vector<double> given(q.begin(), q.end());
-  for (const Run& run : tree.runs) {
-    if (run.kind == JointKind::screw) continue;
-    for (Index i = run.begin; i < run.end; ++i) {
-      const std::span<double> turn(given.data() + tree.first_q(i) + (run.kind == JointKind::free ? 3 : 0), 4);
-      const double length = std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]);
-      if (!(length > 1e-3)) {
-        throw InputError(fmt::format("the quaternion of joint \"{}\" has length {}; expected 1",
-                                     model_->names.joint[static_cast<std::size_t>(i)], length));
-      }
-      for (double& number : turn) number /= length;
-    }
-  }
+  normalise_positions(*model_, given);
   const std::vector<double> rates = velocities();
   std::ranges::copy(given, state_.q.flat().begin());
-  for (const Mimic& mimic : model_->mimics) {
-    state_.q(mimic.follower_q) = mimic.multiplier * state_.q(mimic.leader_q) + mimic.offset;
-  }
   changed();
   set_velocities(rates);
 }
@@ -76,6 +59,15 @@ void Simulation::set_velocities(std::span<const double> v) {
   spread_mimics<double>(model_->mimics, rate_);
   stepper_.momentum_of(rate_, state_.p);
   changed();
+}
+
+void Simulation::set_forces(std::span<const double> force) {
+  if (!force.empty()) check_row_count("forces", force.size(), model_->tree.shape.velocities);
+  for (std::size_t i = 0; i < force.size(); ++i) {
+    if (!std::isfinite(force[i])) throw InputError(fmt::format("the force on \"{}\" is {}", model_->names.velocity[i], force[i]));
+  }
+  stepper_.apply(force);
+  stepper_.refresh(state_);
 }
 
 StepReport Simulation::step() {

@@ -20,12 +20,6 @@
 
 namespace linden {
 
-struct Energy {
-  double kinetic = 0;    // 1/2 p.M^-1 p [J]
-  double potential = 0;  // of gravity [J]; zero where the centre of mass is at the height of the world's origin
-  double total() const { return kinetic + potential; }
-};
-
 /// Of the whole system, about the world's origin and in the world's frame.
 struct Momentum {
   std::array<double, 3> angular{};  // [kg m^2/s]
@@ -52,6 +46,10 @@ class Simulation {
   /// leaders whatever is given for them. set_positions keeps the velocities, not the momenta.
   void set_positions(std::span<const double> q);
   void set_velocities(std::span<const double> v);
+
+  /// Generalized forces [nv; N m, N], on top of gravity and the same over every step until they are set anew; empty: none (the default).
+  /// Conjugate to the velocities: of a ball or free joint moment, then force, in the body's frame.
+  void set_forces(std::span<const double> force);
 
   /// One step. A report that is not ok() leaves the state as it was before.
   StepReport step();

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/convergence.hpp"
 #include "kernels/advance_map.hpp"
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/displacement_down.hpp"
@@ -14,26 +15,13 @@
 #include "kernels/newton_factor_up.hpp"
 #include "kernels/placement_map.hpp"
 #include "kernels/residual_up.hpp"
+#include "kernels/rounding_floor_map.hpp"
 #include "kernels/velocity_down.hpp"
 
 namespace linden {
 namespace {
 
-/// A correction that does not bring the energy norm below this share of what it was calls for a fresh Jacobian.
-constexpr double kSlowProgress = 0.1;
-
-/// Rounding of a joint's residual, in epsilons of the impulses that meet there. Where iterations gain nothing any more it stalls at 0.1
-/// to 0.7 of them (chains of 10 to 10,000 hinges, of 100 ball joints, a tree of 1,023, both solvers).
-constexpr double kFloorEpsilons = 4;
-
-/// Above this relative residual no step is accepted as converged, rounding or not.
-constexpr double kFloorCeiling = 1e-6;
-
 constexpr int kMaxBacktracks = 10;
-
-/// A step may gain this share of the kinetic energy beyond the work of the forces: what second order leaves where a motion is barely
-/// resolved. On ten-link chains whipping at 4 to 6 ms steps gain 0.02 to 0.12 at most; second roots, met from 8 ms on, 0.77 and more.
-constexpr double kMostGain = 0.25;
 
 /// Next value of the polynomial through the last 1, ..., 5 values, latest first.
 constexpr double kExtrapolation[kHistory][kHistory] = {
@@ -46,6 +34,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Stepper::Stepper(const Model& model, const Options& options)
     : model_(model),
+      constants_(&model.constants),
       options_(options),
       max_iterations_(options.max_iterations > 0 ? options.max_iterations : options.solver == Solver::newton ? 50 : 1000),
       gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
@@ -56,15 +45,29 @@ Stepper::Stepper(const Model& model, const Options& options)
 }
 
 void Stepper::refresh(const State<double>& state) {
-  placement_map(model_.tree, model_.constants, state.q, work_.placement);
+  placement_map(model_.tree, *constants_, state.q, work_.placement);
   forces();
 }
 
+void Stepper::apply(std::span<const double> force) {
+  applied_.assign(force.begin(), force.end());
+  if (!gravity_) {
+    for (double& value : work_.force.flat()) value = 0;
+  }
+}
+
 void Stepper::forces() {
-  if (!gravity_) return;
+  if (gravity_) gravity();
+  for (std::size_t row = 0; row < applied_.size(); ++row) {
+    double& force = work_.force.flat()[row];
+    force = gravity_ ? force + applied_[row] : applied_[row];
+  }
+}
+
+void Stepper::gravity() {
   const Vec3<double> g{options_.gravity[0], options_.gravity[1], options_.gravity[2]};
   gravity_field_down(model_.tree, work_.placement, g, work_.field);
-  potential_ = gravity_force_up(model_.tree, model_.constants, work_.placement, work_.field, work_.first_moment, work_.force);
+  potential_ = gravity_force_up(model_.tree, *constants_, work_.placement, work_.field, work_.first_moment, work_.force);
 }
 
 StepReport Stepper::step(State<double>& state, int& history, double h) {
@@ -106,25 +109,25 @@ bool Stepper::halves(State<double>& state, int& history, double h, int depth, St
   return true;
 }
 
-bool Stepper::Evaluation::usable() const { return least_w > 0 && std::isfinite(plain) && std::isfinite(energy); }
+bool Stepper::Evaluated::usable() const { return least_w > 0 && std::isfinite(plain) && std::isfinite(energy); }
 
-Stepper::Evaluation Stepper::evaluate(StepReport& report) {
+Stepper::Evaluated Stepper::evaluate(StepReport& report) {
   report.evaluations += 1;
-  Evaluation result;
+  Evaluated result;
   result.least_w = displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
-  result.energy = momentum_map(model_.tree, model_.constants, work_.displacement, work_.twist, work_.body_momentum, work_.impulse);
-  result.plain = residual_up(model_.tree, model_.constants, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
+  result.energy = momentum_map(model_.tree, *constants_, work_.displacement, work_.twist, work_.body_momentum, work_.impulse);
+  result.plain = residual_up(model_.tree, *constants_, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
   fold_mimics(ties_.mimics(), work_.residual);
   return result;
 }
 
 void Stepper::factor_mass() {
-  articulated_inertia_up(model_.tree, model_.constants, work_.placement, work_.articulated, gains());
+  articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains());
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
-        impulse_pass_up(model_.tree, model_.constants, work_.placement, gains(), r, work_.bias, work_.innovation);
-        rate_down(model_.tree, model_.constants, work_.placement, gains(), work_.innovation, work_.variation, x);
+        impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), r, work_.bias, work_.innovation);
+        rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, x);
       },
       work_.increment);
 }
@@ -132,13 +135,13 @@ void Stepper::factor_mass() {
 void Stepper::factor(StepReport& report) {
   report.factorisations += 1;
   if (options_.solver == Solver::riqn) return factor_mass();
-  newton_factor_up(model_.tree, model_.constants, work_.placement, work_.motion, work_.twist, work_.body_momentum,
+  newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.twist, work_.body_momentum,
                    work_.articulated, gains());
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
-        impulse_pass_up(model_.tree, model_.constants, work_.placement, gains(), r, work_.bias, work_.innovation);
-        increment_down(model_.tree, model_.constants, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
+        impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), r, work_.bias, work_.innovation);
+        increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
       },
       work_.increment);
 }
@@ -146,7 +149,7 @@ void Stepper::factor(StepReport& report) {
 /// Squared energy norm of h r. Ties between joints make the whole solve necessary for it.
 double Stepper::pass_up() {
   const double norm =
-      impulse_pass_up(model_.tree, model_.constants, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
+      impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
   if (ties_.empty()) return norm;
   pass_down();
   double tied = 0;
@@ -156,19 +159,19 @@ double Stepper::pass_up() {
 
 void Stepper::pass_down() {
   if (options_.solver == Solver::riqn) {
-    rate_down(model_.tree, model_.constants, work_.placement, gains(), work_.innovation, work_.variation, work_.increment);
+    rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, work_.increment);
   } else {
-    increment_down(model_.tree, model_.constants, work_.placement, work_.motion, gains(), work_.innovation, work_.variation,
+    increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation,
                    work_.increment);
   }
   if (!ties_.empty()) ties_.complete(work_.increment);
 }
 
 void Stepper::correct(double factor) {
-  correct_motion_map(model_.tree, model_.constants, work_.applied, factor, work_.delta, work_.motion);
+  correct_motion_map(model_.tree, *constants_, work_.applied, factor, work_.delta, work_.motion);
 }
 
-bool Stepper::converged(const Evaluation& now, double norm, double h) const {
+bool Stepper::converged(const Evaluated& now, double norm, double h) const {
   if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * h;
   return 0.5 * norm <= options_.tolerance * options_.tolerance * now.energy;
 }
@@ -217,26 +220,11 @@ Index Stepper::largest_residual() const {
 
 /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small beside
 /// the motion, or beside what gravity alone would do to it where all is at rest.
-bool Stepper::at_rounding_floor(const Evaluation& now, double norm, double h) const {
+bool Stepper::at_rounding_floor(const Evaluated& now, double norm, double h) const {
   const auto& g = options_.gravity;
-  const double fall = 0.5 * model_.constants.subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
+  const double fall = 0.5 * constants_->subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
   if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
-  double sum = 0;
-  const auto length = [](const Vec3<double>& a) { return std::sqrt(dot(a, a)); };
-  up(model_.tree, [&](auto joint, Index i) {
-    const auto F = load<Wrench, double>(work_.impulse, i);
-    const Index row = model_.tree.first_v(i), block = model_.tree.first_block(i);
-    constexpr Index n = velocity_count(joint);
-    for (Index k = 0; k < n; ++k) {
-      double meets = std::abs(work_.momentum_target(row + k));
-      if constexpr (joint == JointKind::screw) {
-        meets += std::abs(model_.constants.screw(i, 0)) * length(F.n) + std::abs(model_.constants.screw(i, 1)) * length(F.f);
-      } else {
-        meets += k < 3 ? length(F.n) : length(F.f);
-      }
-      sum += meets * meets * std::abs(work_.joint_inverse(block + k * n + k));
-    }
-  });
+  const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
   const double unit = kFloorEpsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;
 }
@@ -256,9 +244,9 @@ void Stepper::first_guess(const State<double>& state, int history, double h) {
     case FirstGuess::ig3: {
       // qdd = M^-1 (-C + Q), semi-implicit Euler: delta = h (v + h qdd)
       velocity_of(state.p, delta);
-      velocity_down(model_.tree, model_.constants, work_.placement, delta, work_.twist);
-      coriolis_down(model_.tree, model_.constants, work_.placement, delta, work_.twist, work_.body_momentum, work_.impulse);
-      impulse_up(model_.tree, model_.constants, work_.placement, work_.impulse, work_.residual);
+      velocity_down(model_.tree, *constants_, work_.placement, delta, work_.twist);
+      coriolis_down(model_.tree, *constants_, work_.placement, delta, work_.twist, work_.body_momentum, work_.impulse);
+      impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, work_.residual);
       for (Index row = 0; row < n; ++row) work_.residual(row) = work_.force(row) - work_.residual(row);
       apply_mass_inverse(work_.residual, work_.residual);
       for (Index row = 0; row < n; ++row) delta(row) = h * (delta(row) + h * work_.residual(row));
@@ -305,12 +293,12 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(state, history, h);
   spread_mimics<double>(ties_.mimics(), work_.delta);  // corrections keep ties, so the guess must
-  motion_map(model_.tree, model_.constants, work_.delta, work_.motion);
-  Evaluation now = evaluate(report);
+  motion_map(model_.tree, *constants_, work_.delta, work_.motion);
+  Evaluated now = evaluate(report);
   if (!now.usable()) {
     // no displacement at all is always within the range of log
     for (double& value : work_.delta.flat()) value = 0;
-    motion_map(model_.tree, model_.constants, work_.delta, work_.motion);
+    motion_map(model_.tree, *constants_, work_.delta, work_.motion);
     now = evaluate(report);
   }
   factor(report);
@@ -396,18 +384,16 @@ void Stepper::finish(State<double>& state, int& history, double h) {
   for (const Mimic& mimic : ties_.mimics()) {
     state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
-  end_momentum_map(tree, work_.twist, work_.body_momentum, work_.impulse);
   refresh(state);
   state.pace(0, 0) = kinetic_;
   state.pace(0, 1) = 0.5 * (work_at_begin + work(work_.force));
-  impulse_up(tree, model_.constants, work_.placement, work_.impulse, work_.increment);
-  momentum_update_map(tree, h, work_.displacement, work_.increment, work_.residual, work_.force, state.p);
+  momentum_update_map(tree, *constants_, h, work_.displacement, work_.impulse, work_.residual, work_.force, state.p);
   fold_mimics(ties_.mimics(), state.p);
 }
 
 void Stepper::apply_mass_inverse(const Field<double>& p, Field<double>& v) {
-  impulse_pass_up(model_.tree, model_.constants, work_.placement, gains(), p, work_.bias, work_.innovation);
-  rate_down(model_.tree, model_.constants, work_.placement, gains(), work_.innovation, work_.variation, v);
+  impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), p, work_.bias, work_.innovation);
+  rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, v);
   if (!ties_.empty()) ties_.complete(v);
 }
 
@@ -417,9 +403,9 @@ void Stepper::velocity_of(const Field<double>& p, Field<double>& v) {
 }
 
 void Stepper::momentum_of(const Field<double>& v, Field<double>& p) {
-  velocity_down(model_.tree, model_.constants, work_.placement, v, work_.twist);
-  momentum_of_map(model_.tree, model_.constants, work_.twist, work_.impulse);
-  impulse_up(model_.tree, model_.constants, work_.placement, work_.impulse, p);
+  velocity_down(model_.tree, *constants_, work_.placement, v, work_.twist);
+  momentum_of_map(model_.tree, *constants_, work_.twist, work_.impulse);
+  impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, p);
   fold_mimics(ties_.mimics(), p);
 }
 

@@ -8,7 +8,7 @@
 //   |   newton_factor_up (once a step) or articulated_inertia_up (riqn)
 //   |   impulse_pass_up                                         energy norm of r: converged?
 //   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
-//   advance_map, placement_map, gravity, end_momentum_map, impulse_up, momentum_update_map
+//   advance_map, placement_map, gravity, momentum_update_map
 //
 // The equation may have other roots, far from the motion, once a step is too large for it. Whoever lands on one gains energy out of
 // nothing: kinetic energy of the mean motion minus the work of the forces is compared with the step before.
@@ -16,6 +16,9 @@
 // Symplectic, time-symmetric, second order; no allocation. A solve that makes no progress is backtracked, then given a fresh exact
 // Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
 #pragma once
+
+#include <span>
+#include <vector>
 
 #include "engine/options.hpp"
 #include "engine/step_report.hpp"
@@ -26,12 +29,23 @@
 
 namespace linden {
 
+struct Energy {
+  double kinetic = 0;    // 1/2 p.M^-1 p [J]
+  double potential = 0;  // of gravity [J]; zero where the centre of mass is at the height of the world's origin
+  double total() const { return kinetic + potential; }
+};
+
 class Stepper {
  public:
   Stepper(const Model& model, const Options& options);
 
   /// Brings placements and forces to the positions in `state`; call after any change of them from outside.
   void refresh(const State<double>& state);
+
+  /// Generalized forces [nv] on top of gravity, the same until they are set anew; followed by a refresh. Empty: none.
+  void apply(std::span<const double> force);
+  /// Masses and inertias of an instance that differs from the model, followed by a refresh. They must live as long as they are used.
+  void use(const BodyConstants<double>& constants) { constants_ = &constants; }
 
   /// One step of `h` seconds. `history`: how many rows of state.history are valid; updated.
   StepReport step(State<double>& state, int& history, double h);
@@ -47,7 +61,7 @@ class Stepper {
   const Workspace<double>& workspace() const { return work_; }
 
  private:
-  struct Evaluation {
+  struct Evaluated {
     double least_w;    // see displacement_down
     double energy;     // h^2 x kinetic energy of the mean motion
     double plain;      // |h r|^2
@@ -55,16 +69,16 @@ class Stepper {
   };
 
   void first_guess(const State<double>& state, int history, double h);
-  Evaluation evaluate(StepReport& report);
+  Evaluated evaluate(StepReport& report);
   void factor(StepReport& report);
   void factor_mass();
   double pass_up();
   void pass_down();
   void correct(double factor);
-  bool converged(const Evaluation& now, double norm, double h) const;
+  bool converged(const Evaluated& now, double norm, double h) const;
   bool gains_energy(const State<double>& state, double h);
   double work(const Field<double>& force) const;
-  bool at_rounding_floor(const Evaluation& now, double norm, double h) const;
+  bool at_rounding_floor(const Evaluated& now, double norm, double h) const;
   Index worst_displacement() const;
   Index largest_residual() const;
   Index fastest_body() const;
@@ -73,10 +87,12 @@ class Stepper {
   bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
   void finish(State<double>& state, int& history, double h);
   void forces();
+  void gravity();
   void apply_mass_inverse(const Field<double>& p, Field<double>& v);
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
 
   const Model& model_;
+  const BodyConstants<double>* constants_;
   Options options_;
   int max_iterations_;
   bool gravity_;
@@ -84,6 +100,7 @@ class Stepper {
   double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
   double kinetic_ = 0;          // the same in J
   double failed_residual_ = 0;  // of the last solve that failed
+  std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;
   State<double> last_good_;

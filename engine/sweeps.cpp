@@ -43,12 +43,10 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options) {
   add(true, {correction, "correct_motion_map", "screw, increment", "delta, motion"});
   add(quaternions, {last, "displacement_map", "motion", "delta"});
   add(true, {last, "advance_map", "motion, delta", "q, history"});
-  add(true, {last, "end_momentum_map", "twist, body_momentum", "impulse"});
   add(true, {last, "placement_map", "tree_placement, screw, q", "placement"});
   add(gravity, {last, "gravity_field_down", "placement", "field"});
   add(gravity, {last, "gravity_force_up", "inertia, subtree_mass, screw, placement, field", "first_moment, force"});
-  add(true, {last, "impulse_up", "screw, placement, impulse", "impulse, increment"});
-  add(true, {last, "momentum_update_map", "displacement, increment, residual, force", "p"});
+  add(true, {last, "momentum_update_map", "screw, displacement, impulse, residual, force", "p"});
   add(ties, {last, "fold_mimics", "p", "p"});
   return list;
 }

@@ -21,21 +21,25 @@ LINDEN_INLINE Quaternion<S> normalised(const Quaternion<S>& q) {
   return {scale * q.v, scale * q.w};
 }
 
+/// q of a joint after the motion M.
+template <JointKind Kind, class S>
+LINDEN_INLINE void advance(Joint<Kind>, Index row, const S& delta, const Displacement<S>& M, Field<S>& q) {
+  if constexpr (Kind == JointKind::screw) {
+    q(row) = q(row) + delta;
+  } else {
+    const Index turn = Kind == JointKind::free ? row + 3 : row;
+    const Quaternion<S> before{load3<S>(q, turn), q(turn + 3)};
+    if constexpr (Kind == JointKind::free) store3(q, row, load3<S>(q, row) + rotate(before, M.p));
+    const Quaternion<S> after = normalised(before * M.r);
+    store3(q, turn, after.v);
+    q(turn + 3) = after.w;
+  }
+}
+
 template <class S>
 void advance_map(const Tree& tree, const Field<S, 7>& motion, const Field<S>& delta, Field<S>& q) {
   down(tree, [&](auto joint, Index i) {
-    const Index row = tree.first_q(i);
-    if constexpr (joint == JointKind::screw) {
-      q(row) = q(row) + delta(tree.first_v(i));
-    } else {
-      const auto M = load<Displacement, S>(motion, i);
-      const Index turn = joint == JointKind::free ? row + 3 : row;
-      const Quaternion<S> before{load3<S>(q, turn), q(turn + 3)};
-      if constexpr (joint == JointKind::free) store3(q, row, load3<S>(q, row) + rotate(before, M.p));
-      const Quaternion<S> after = normalised(before * M.r);
-      store3(q, turn, after.v);
-      q(turn + 3) = after.w;
-    }
+    advance(joint, tree.first_q(i), delta(tree.first_v(i)), load<Displacement, S>(motion, i), q);
   });
 }
 

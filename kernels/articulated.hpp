@@ -20,48 +20,64 @@ struct Gains {
   Field<S>& inverse;     // nv x nv blocks
 };
 
-/// Row by row, as the 6 x 6 matrix it is.
+/// Values before this line go through memory to those after it. A 6 x 6 matrix and two placements do not fit in 32 registers, and
+/// left to themselves compilers keep all 36 numbers alive and spill them twice over: the factor of a block took 132 ns a body so, 
+/// and NEWNS in steps that each fit.
+LINDEN_INLINE void settle() { asm volatile("" ::: "memory"); }
+
+/// Where row k and column k of a 6 x 6 matrix stored as a Mat6 begin.
+constexpr int row_start(int k) { return 18 * (k / 3) + 3 * (k % 3); }
+constexpr int column_start(int k) { return 9 * (k / 3) + k % 3; }
+
+/// Row: a covector of (w, v).
 template <class S>
-LINDEN_INLINE std::array<S, 36> to_array(const Mat6<S>& A) {
-  std::array<S, 36> a;
-  const auto put = [&](std::size_t at, const Mat3<S>& block) {
-    block.x.to(&a[at]);
-    block.y.to(&a[at + 6]);
-    block.z.to(&a[at + 12]);
-  };
-  put(0, A.aa);
-  put(3, A.ab);
-  put(18, A.ba);
-  put(21, A.bb);
-  return a;
+LINDEN_INLINE Twist<S> load_row(const S* row) {
+  return {Vec3<S>::from(row), Vec3<S>::from(row + 9)};
 }
 
-/// Takes the joint of body i out of A, stores its gains. A free joint leaves nothing for its parent to feel.
+template <class S>
+LINDEN_INLINE void store_row(S* row, const Twist<S>& value) {
+  value.w.to(row);
+  value.v.to(row + 9);
+}
+
+template <class S>
+LINDEN_INLINE Wrench<S> load_column(const S* column) {
+  return {{column[0], column[3], column[6]}, {column[18], column[21], column[24]}};
+}
+
+/// Takes the joint of body i out of A, 36 numbers stored as a Mat6, and stores its gains. What is left for the parent to feel: of a free
+/// joint nothing, of a ball joint a force alone.
 template <JointKind Kind, class S, class Element>
-LINDEN_INLINE Mat6<S> eliminate_joint(Joint<Kind>, const Tree& tree, const BodyConstants<Element>& constants, Index i, const Mat6<S>& A,
-                        const Gains<S>& gains) {
+LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyConstants<Element>& constants, Index i, const S* A,
+                                   const Gains<S>& gains, S* felt) {
   const Index row = tree.first_v(i), block = tree.first_block(i);
   const S zero(0.0), one(1.0);
-  const Vec3<S> none{zero, zero, zero};
   if constexpr (Kind == JointKind::screw) {
     const Screw<S> screw = load_screw<S>(constants, i);
-    const S r = screw.r, t = screw.t;
-    const Wrench<S> U{{r * A.aa.x.z + t * A.ab.x.z, r * A.aa.y.z + t * A.ab.y.z, r * A.aa.z.z + t * A.ab.z.z},
-                      {r * A.ba.x.z + t * A.bb.x.z, r * A.ba.y.z + t * A.bb.y.z, r * A.ba.z.z + t * A.bb.z.z}};
-    const S inverse = one / (r * U.n.z + t * U.f.z);
+    const Wrench<S> U = screw.r * load_column(A + column_start(2)) + screw.t * load_column(A + column_start(5));
+    const S inverse = one / (screw.r * U.n.z + screw.t * U.f.z);
     const Wrench<S> up = inverse * U;
-    const Twist<S> W{r * A.aa.z + t * A.ba.z, r * A.ab.z + t * A.bb.z};  // rows of S^T A, as covectors of (w, v)
+    const Twist<S> W = screw.r * load_row(A + row_start(2)) + screw.t * load_row(A + row_start(5));
     store(gains.up, row, up);
     store(gains.down, row, inverse * W);
     gains.inverse(block) = inverse;
-    return {A.aa - outer(up.n, W.w), A.ab - outer(up.n, W.v), A.ba - outer(up.f, W.w), A.bb - outer(up.f, W.v)};
+    const auto take_out = [&](int at, const S& share) LINDEN_INLINE_LAMBDA { store_row(felt + at, load_row(A + at) - share * W); };
+    take_out(row_start(0), up.n.x);
+    take_out(row_start(1), up.n.y);
+    take_out(row_start(2), up.n.z);
+    take_out(row_start(3), up.f.x);
+    take_out(row_start(4), up.f.y);
+    take_out(row_start(5), up.f.z);
   } else if constexpr (Kind == JointKind::ball) {
+    const auto M = Mat6<S>::from(A);
     std::array<S, 9> flat;
-    A.aa.to(flat.data());
+    M.aa.to(flat.data());
     invert<3>(flat);
     const auto inverse = Mat3<S>::from(flat.data());
     for (Index k = 0; k < 9; ++k) gains.inverse(block + k) = flat[static_cast<std::size_t>(k)];
-    const Mat3<S> up = A.ba * inverse, down = inverse * A.ab;
+    const Vec3<S> none{zero, zero, zero};
+    const Mat3<S> up = M.ba * inverse, down = inverse * M.ab;
     const Mat3<S> columns = transpose(up);
     store(gains.up, row, Wrench<S>{{one, zero, zero}, columns.x});
     store(gains.up, row + 1, Wrench<S>{{zero, one, zero}, columns.y});
@@ -70,27 +86,64 @@ LINDEN_INLINE Mat6<S> eliminate_joint(Joint<Kind>, const Tree& tree, const BodyC
     store(gains.down, row + 1, Twist<S>{{zero, one, zero}, down.y});
     store(gains.down, row + 2, Twist<S>{{zero, zero, one}, down.z});
     const Mat3<S> nothing{none, none, none};
-    return {nothing, nothing, nothing, A.bb - up * A.ab};
+    Mat6<S>{nothing, nothing, nothing, M.bb - up * M.ab}.to(felt);
   } else {
-    auto inverse = to_array(A);
+    std::array<S, 36> inverse;
+    for (int k = 0; k < 6; ++k) load_row(A + row_start(k)).to(&inverse[static_cast<std::size_t>(6 * k)]);
     invert<6>(inverse);
     for (Index k = 0; k < 36; ++k) gains.inverse(block + k) = inverse[static_cast<std::size_t>(k)];
     // The gains are the identity: filled in for completeness, so that no row of them is ever left unwritten.
     for (int k = 0; k < 6; ++k) {
       for (int c = 0; c < 6; ++c) gains.up(row + k, c) = gains.down(row + k, c) = k == c ? one : zero;
     }
-    const Mat3<S> nothing{none, none, none};
-    return {nothing, nothing, nothing, nothing};
+    for (int k = 0; k < 36; ++k) felt[k] = zero;
   }
 }
 
-/// Ad_{X^-1}^T A Ad_{X^-1}: A given in the child's frame, in the parent's.
-template <class S>
-LINDEN_INLINE Mat6<S> to_parent(const Placement<S>& X, const Mat6<S>& A) {
-  const auto turned = [&](const Mat3<S>& block) { return times_transpose(X.R * block, X.R); };
-  const Mat3<S> ba = turned(A.ba), bb = turned(A.bb);
-  const Mat3<S> aa = turned(A.aa) + hat_times(X.p, ba), ab = turned(A.ab) + hat_times(X.p, bb);
-  return {aa - times_hat(ab, X.p), ab, ba - times_hat(bb, X.p), bb};
+/// Ad_{X^-1}^T A Ad_{X'^-1}: A given in the child's frame, in the parent's; poses may arrive through another placement X' than impulses
+/// leave by. Rows first, in place, then columns: take(at, value) receives the 36 numbers, stored as a Mat6.
+template <class S, class Take>
+LINDEN_INLINE void to_parent(const Placement<S>& X, const Placement<S>& X_pose, S* A, const Take& take) {
+  const auto row = [&](int at) LINDEN_INLINE_LAMBDA {
+    const Twist<S> a = load_row(A + at);
+    const Vec3<S> v = X_pose.R * a.v;
+    store_row(A + at, Twist<S>{X_pose.R * a.w - cross(v, X_pose.p), v});
+  };
+  const auto column = [&](int at) LINDEN_INLINE_LAMBDA {
+    const Wrench<S> a = to_parent(X, load_column(A + at));
+    take(at, a.n.x);
+    take(at + 3, a.n.y);
+    take(at + 6, a.n.z);
+    take(at + 18, a.f.x);
+    take(at + 21, a.f.y);
+    take(at + 24, a.f.z);
+  };
+  row(row_start(0));
+  row(row_start(1));
+  row(row_start(2));
+  row(row_start(3));
+  row(row_start(4));
+  row(row_start(5));
+  settle();
+  column(column_start(0));
+  column(column_start(1));
+  column(column_start(2));
+  column(column_start(3));
+  column(column_start(4));
+  column(column_start(5));
+}
+
+/// X M: the placement of the body after its joint has moved.
+template <JointKind Kind, class S>
+LINDEN_INLINE Placement<S> after_motion(Joint<Kind>, const Placement<S>& X, const Displacement<S>& M) {
+  if constexpr (Kind == JointKind::screw) {
+    // full angle from the half angle
+    const S c = S(1.0) - S(2.0) * M.r.v.z * M.r.v.z, s = S(2.0) * M.r.v.z * M.r.w;
+    const auto turn = [&](const Vec3<S>& r) LINDEN_INLINE_LAMBDA { return Vec3<S>{c * r.x + s * r.y, c * r.y - s * r.x, r.z}; };
+    return {{turn(X.R.x), turn(X.R.y), turn(X.R.z)}, X.p + M.p.z * Vec3<S>{X.R.x.z, X.R.y.z, X.R.z.z}};
+  } else {
+    return {X.R * rotation(M.r), X.p + X.R * M.p};
+  }
 }
 
 }  // namespace linden

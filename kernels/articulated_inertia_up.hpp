@@ -24,10 +24,12 @@ void articulated_inertia_up(const Tree& tree, const BodyConstants<Element>& cons
     store(articulated, i, Mat6<S>{G.rotational(), C, transpose(C), diagonal(G.m)});
   }
   up(tree, [&](auto joint, Index i) {
-    const Mat6<S> felt = eliminate_joint(joint, tree, constants, i, load<Mat6, S>(articulated, i), gains);
+    S felt[36];
+    eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, felt);
     if constexpr (joint != JointKind::free) {
-      const Index parent = tree.parent(i);
-      store(articulated, parent, load<Mat6, S>(articulated, parent) + to_parent(load<Placement, S>(placement, i), felt));
+      const auto X = load<Placement, S>(placement, i);
+      S* const parent = articulated.row(tree.parent(i));
+      to_parent(X, X, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { parent[at] = parent[at] + value; });
     }
   });
 }

@@ -21,6 +21,23 @@
 
 namespace linden {
 
+/// dT of a body from its parent's, the placement and the motion of its joint.
+template <JointKind Kind, class S>
+LINDEN_INLINE Displacement<S> moved(Joint<Kind>, const Displacement<S>& parent, const Placement<S>& X, const Displacement<S>& M) {
+  const Vec3<S>& v = parent.r.v;
+  const Vec3<S> shift = parent.p + S(2.0) * cross(v, parent.r.w * X.p + cross(v, X.p));
+  const Displacement<S> carried{{transpose_times(X.R, v), parent.r.w}, transpose_times(X.R, shift)};
+  if constexpr (Kind == JointKind::screw) {
+    // M turns about z and shifts along z
+    const S c = M.r.w, s = M.r.v.z, w = carried.r.w;
+    const Vec3<S>& u = carried.r.v;
+    const Vec3<S> axis{S(2.0) * (u.x * u.z + w * u.y), S(2.0) * (u.y * u.z - w * u.x), S(1.0) - S(2.0) * (u.x * u.x + u.y * u.y)};
+    return {{{u.x * c + u.y * s, u.y * c - u.x * s, u.z * c + w * s}, w * c - u.z * s}, carried.p + M.p.z * axis};
+  } else {
+    return carried * M;
+  }
+}
+
 template <class S>
 S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field<S, 7>& motion, Field<S, 7>& displacement) {
   using std::min;
@@ -28,25 +45,10 @@ S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field
   store(displacement, 0, Displacement<S>{{{zero, zero, zero}, one}, {zero, zero, zero}});
   S least = one;
   down(tree, [&](auto joint, Index i) {
-    const auto parent = load<Displacement, S>(displacement, tree.parent(i));
-    const auto X = load<Placement, S>(placement, i);
     const auto M = load<Displacement, S>(motion, i);
-    const Vec3<S>& v = parent.r.v;
-    const Vec3<S> shift = parent.p + S(2.0) * cross(v, parent.r.w * X.p + cross(v, X.p));
-    const Displacement<S> carried{{transpose_times(X.R, v), parent.r.w}, transpose_times(X.R, shift)};
-    Displacement<S> moved;
-    if constexpr (joint == JointKind::screw) {
-      // M turns about z and shifts along z
-      const S c = M.r.w, s = M.r.v.z, w = carried.r.w;
-      const Vec3<S>& u = carried.r.v;
-      moved.r = {{u.x * c + u.y * s, u.y * c - u.x * s, u.z * c + w * s}, w * c - u.z * s};
-      const Vec3<S> axis{S(2.0) * (u.x * u.z + w * u.y), S(2.0) * (u.y * u.z - w * u.x), one - S(2.0) * (u.x * u.x + u.y * u.y)};
-      moved.p = carried.p + M.p.z * axis;
-    } else {
-      moved = carried * M;
-    }
-    store(displacement, i, moved);
-    least = min(least, min(moved.r.w, M.r.w));
+    const auto D = moved(joint, load<Displacement, S>(displacement, tree.parent(i)), load<Placement, S>(placement, i), M);
+    store(displacement, i, D);
+    least = min(least, min(D.r.w, M.r.w));
   });
   return least;
 }

@@ -16,28 +16,35 @@
 
 namespace linden {
 
-template <class S, class Element, class BeforeJoint>
-void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
-                const Field<S>& innovation, BeforeJoint&& before_joint, Field<S, 6>& variation, Field<S>& increment) {
+/// Delta of joint i, where xi is how its body's pose would change if it did not yield.
+template <JointKind Kind, class S>
+LINDEN_INLINE Wrench<S> joint_increment(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& u,
+                                        const Twist<S>& xi) {
+  const Index row = tree.first_v(i);
+  Wrench<S> delta = yield(joint, gains.inverse, tree.first_block(i), u);
+  const auto along = [&](Index k) {
+    const auto gain = load<Twist, S>(gains.down, row + k);
+    return dot(gain.w, xi.w) + dot(gain.v, xi.v);
+  };
+  if constexpr (Kind == JointKind::screw) {
+    delta.n.x = delta.n.x - along(0);
+  } else if constexpr (Kind == JointKind::ball) {
+    delta.n = delta.n - Vec3<S>{along(0), along(1), along(2)};
+  } else {
+    delta = delta - Wrench<S>{xi.w, xi.v};
+  }
+  return delta;
+}
+
+template <class S, class PlacementOf, class Element>
+void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Gains<S>& gains,
+                const Field<S>& innovation, Field<S, 6>& variation, Field<S>& increment) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   store(variation, 0, Twist<S>{zero, zero});
   down(tree, [&](auto joint, Index i) {
     const Index row = tree.first_v(i);
-    const auto carried = to_child(load<Placement, S>(placement, i), load<Twist, S>(variation, tree.parent(i)));
-    const Twist<S> xi = before_joint(joint, i, carried);
-    Wrench<S> delta = yield(joint, gains.inverse, tree.first_block(i), load_joint(joint, innovation, row));
-    const auto along = [&](Index k) {
-      const auto gain = load<Twist, S>(gains.down, row + k);
-      return dot(gain.w, xi.w) + dot(gain.v, xi.v);
-    };
-    if constexpr (joint == JointKind::screw) {
-      delta.n.x = delta.n.x - along(0);
-    } else if constexpr (joint == JointKind::ball) {
-      delta.n = delta.n - Vec3<S>{along(0), along(1), along(2)};
-    } else {
-      delta = delta - Wrench<S>{xi.w, xi.v};
-    }
-    store_joint(joint, increment, row, delta);
+    const Twist<S> xi = to_child(placement_of(joint, i), load<Twist, S>(variation, tree.parent(i)));
+    store_joint(joint, increment, row, joint_increment(joint, tree, gains, i, load_joint(joint, innovation, row), xi));
     store(variation, i, add_motion(joint, constants, i, row, increment, xi));
   });
 }
@@ -46,25 +53,17 @@ template <class S, class Element>
 void increment_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                     const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Field<S, 6>& variation,
                     Field<S>& increment) {
-  const auto before_joint = [&](auto joint, Index i, const Twist<S>& carried) {
-    const auto M = load<Displacement, S>(motion, i);
-    if constexpr (joint == JointKind::screw) {
-      const S c = S(1.0) - S(2.0) * M.r.v.z * M.r.v.z, s = S(2.0) * M.r.v.z * M.r.w, t = M.p.z;
-      const auto back = [&](const Vec3<S>& a) { return Vec3<S>{c * a.x + s * a.y, c * a.y - s * a.x, a.z}; };
-      const Vec3<S>& w = carried.w;
-      return Twist<S>{back(w), back(Vec3<S>{carried.v.x + t * w.y, carried.v.y - t * w.x, carried.v.z})};
-    } else {
-      return to_child(M, carried);
-    }
+  const auto placement_of = [&](auto joint, Index i) {
+    return after_motion(joint, load<Placement, S>(placement, i), load<Displacement, S>(motion, i));
   };
-  yield_down(tree, constants, placement, gains, innovation, before_joint, variation, increment);
+  yield_down(tree, constants, placement_of, gains, innovation, variation, increment);
 }
 
 template <class S, class Element>
 void rate_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
                const Field<S>& innovation, Field<S, 6>& variation, Field<S>& rate) {
-  const auto before_joint = [](auto, Index, const Twist<S>& carried) { return carried; };
-  yield_down(tree, constants, placement, gains, innovation, before_joint, variation, rate);
+  const auto placement_of = [&](auto, Index i) { return load<Placement, S>(placement, i); };
+  yield_down(tree, constants, placement_of, gains, innovation, variation, rate);
 }
 
 }  // namespace linden

@@ -31,39 +31,19 @@ void pose_derivative_map(const Tree& tree, const BodyConstants<Element>& constan
   }
 }
 
-/// A Ad_{M^-1} for the motion of a joint.
-template <JointKind Kind, class S>
-LINDEN_INLINE Mat6<S> before_motion(Joint<Kind>, const Displacement<S>& M, const Mat6<S>& A) {
-  if constexpr (Kind == JointKind::screw) {
-    // full angle from the half angle: a turn about z mixes the first two columns, a shift along z adds from b to a
-    const S c = S(1.0) - S(2.0) * M.r.v.z * M.r.v.z, s = S(2.0) * M.r.v.z * M.r.w, t = M.p.z;
-    const auto turn = [&](const Vec3<S>& row) { return Vec3<S>{c * row.x - s * row.y, s * row.x + c * row.y, row.z}; };
-    const auto both = [&](const Vec3<S>& a, const Vec3<S>& b) {
-      return Vec3<S>{a.x - t * b.y, a.y + t * b.x, a.z};
-    };
-    const auto columns = [&](const Mat3<S>& block) { return Mat3<S>{turn(block.x), turn(block.y), turn(block.z)}; };
-    const Mat3<S> ab = columns(A.ab), bb = columns(A.bb), aa = columns(A.aa), ba = columns(A.ba);
-    return {{both(aa.x, ab.x), both(aa.y, ab.y), both(aa.z, ab.z)}, ab,
-            {both(ba.x, bb.x), both(ba.y, bb.y), both(ba.z, bb.z)}, bb};
-  } else {
-    // only ball joints come here, and what their parent feels is a force alone
-    Mat6<S> moved = A;
-    moved.bb = times_transpose(A.bb, rotation(M.r));
-    return moved;
-  }
-}
-
 template <class S, class Element>
 void newton_factor_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                       const Field<S, 7>& motion, const Field<S, 6>& twist, const Field<S, 6>& body_momentum,
                       Field<S, 36>& articulated, const Gains<S>& gains) {
   pose_derivative_map(tree, constants, twist, body_momentum, articulated);
   up(tree, [&](auto joint, Index i) {
-    const Mat6<S> felt = eliminate_joint(joint, tree, constants, i, load<Mat6, S>(articulated, i), gains);
+    S felt[36];
+    eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, felt);
     if constexpr (joint != JointKind::free) {
-      const Mat6<S> before = before_motion(joint, load<Displacement, S>(motion, i), felt);
-      const Index parent = tree.parent(i);
-      store(articulated, parent, load<Mat6, S>(articulated, parent) + to_parent(load<Placement, S>(placement, i), before));
+      const auto X = load<Placement, S>(placement, i);
+      const auto X_pose = after_motion(joint, X, load<Displacement, S>(motion, i));
+      S* const parent = articulated.row(tree.parent(i));
+      to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { parent[at] = parent[at] + value; });
     }
   });
 }

@@ -10,31 +10,32 @@
 #pragma once
 
 #include "kernels/joints.hpp"
+#include "kernels/sincos.hpp"
 
 namespace linden {
 
+/// X of the body in slot i.
+template <JointKind Kind, class S, class Element>
+LINDEN_INLINE Placement<S> placed(Joint<Kind>, const BodyConstants<Element>& constants, Index i, Index row, const Field<S>& q) {
+  const auto X = load<Placement, S>(constants.tree_placement, i);
+  if constexpr (Kind == JointKind::screw) {
+    const Screw<S> screw = load_screw<S>(constants, i);
+    const S shift = screw.t * q(row);
+    const SinCos<S> angle = sin_cos(screw.r * q(row));
+    const S s = angle.sin, c = angle.cos;
+    const auto turn = [&](const Vec3<S>& r) { return Vec3<S>{c * r.x + s * r.y, c * r.y - s * r.x, r.z}; };
+    const Vec3<S> axis{X.R.x.z, X.R.y.z, X.R.z.z};
+    return {{turn(X.R.x), turn(X.R.y), turn(X.R.z)}, X.p + shift * axis};
+  } else if constexpr (Kind == JointKind::ball) {
+    return {X.R * rotation(Quaternion<S>{load3<S>(q, row), q(row + 3)}), X.p};
+  } else {
+    return {X.R * rotation(Quaternion<S>{load3<S>(q, row + 3), q(row + 6)}), X.p + X.R * load3<S>(q, row)};
+  }
+}
+
 template <class S, class Element>
 void placement_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& q, Field<S, 12>& placement) {
-  using std::cos;
-  using std::sin;
-  down(tree, [&](auto joint, Index i) {
-    const auto X = load<Placement, S>(constants.tree_placement, i);
-    const Index row = tree.first_q(i);
-    if constexpr (joint == JointKind::screw) {
-      const Screw<S> screw = load_screw<S>(constants, i);
-      const S angle = screw.r * q(row), shift = screw.t * q(row);
-      const S c = cos(angle), s = sin(angle);
-      const auto turn = [&](const Vec3<S>& r) { return Vec3<S>{c * r.x + s * r.y, c * r.y - s * r.x, r.z}; };
-      const Vec3<S> axis{X.R.x.z, X.R.y.z, X.R.z.z};
-      store(placement, i, Placement<S>{{turn(X.R.x), turn(X.R.y), turn(X.R.z)}, X.p + shift * axis});
-    } else if constexpr (joint == JointKind::ball) {
-      const Quaternion<S> turn{load3<S>(q, row), q(row + 3)};
-      store(placement, i, Placement<S>{X.R * rotation(turn), X.p});
-    } else {
-      const Quaternion<S> turn{load3<S>(q, row + 3), q(row + 6)};
-      store(placement, i, Placement<S>{X.R * rotation(turn), X.p + X.R * load3<S>(q, row)});
-    }
-  });
+  down(tree, [&](auto joint, Index i) { store(placement, i, placed(joint, constants, i, tree.first_q(i), q)); });
 }
 
 }  // namespace linden

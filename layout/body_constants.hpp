@@ -4,7 +4,7 @@
 // Scalar is double or float where all instances share one robot, a pack where masses differ from instance to instance.
 #pragma once
 
-#include "layout/field.hpp"
+#include "layout/tree.hpp"
 
 namespace linden {
 
@@ -18,5 +18,14 @@ template <class Scalar>
 struct BodyConstants {
   LINDEN_FIELDS(LINDEN_BODY_CONSTANTS_FIELDS)
 };
+
+/// subtree_mass from the masses of the bodies.
+template <class Constants>
+void sum_subtree_masses(const Tree& tree, Constants& constants) {
+  for (Index i = tree.shape.slots - 1; i >= 0; --i) constants.subtree_mass(i) = constants.inertia(i, 0);
+  for (Index i = tree.shape.slots - 1; i > 0; --i) {
+    constants.subtree_mass(tree.parent(i)) = constants.subtree_mass(tree.parent(i)) + constants.subtree_mass(i);
+  }
+}
 
 }  // namespace linden

@@ -330,8 +330,7 @@ class Build {
       name_coordinates(body);
       set_attributes(i, body);
     }
-    for (Index i = 1; i < slots; ++i) constants.subtree_mass(i) = constants.inertia(i, 0);
-    for (Index i = slots - 1; i > 0; --i) constants.subtree_mass(tree.parent(i)) += constants.subtree_mass(i);
+    sum_subtree_masses(tree, constants);
     for (std::size_t link = 0; link < links_.size(); ++link) {
       names.link[links_[link].name] = {slot_of(carrier_[link].body), carrier_[link].pose};
       if (links_[link].type != JointType::fixed) names.slot_of_joint[links_[link].joint] = slot_of(carrier_[link].body);

@@ -47,6 +47,11 @@ Tree Tree::from_sorted(const std::vector<Index>& parent, const std::vector<Joint
     if (tree.runs.empty() || tree.runs.back().kind != kind[at]) tree.runs.push_back({i, i, kind[at]});
     tree.runs.back().end = i + 1;
   }
+  for (Index& flag : tree.is_leaf.flat()) flag = 1;
+  for (Index i = tree.shape.slots - 1; i > 0; --i) {
+    tree.is_last_child(i) = tree.is_leaf(tree.parent(i));
+    tree.is_leaf(tree.parent(i)) = 0;
+  }
   if (tree.shape.slots > 1) tree.level_begin.push_back(tree.shape.slots);
   return tree;
 }

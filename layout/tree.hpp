@@ -43,7 +43,9 @@ struct Run {
   FIELD(Index, level, 1, slots, "number of joints up to the world")                            \
   FIELD(Index, first_v, 1, slots, "first row of this joint in arrays of velocities")           \
   FIELD(Index, first_q, 1, slots, "first row of this joint in arrays of positions")            \
-  FIELD(Index, first_block, 1, slots, "first row of this joint's nv x nv block")
+  FIELD(Index, first_block, 1, slots, "first row of this joint's nv x nv block")               \
+  FIELD(Index, is_leaf, 1, slots, "1 where a body has no children, else 0")                    \
+  FIELD(Index, is_last_child, 1, slots, "1 where no child of the same parent comes after: the first that an upward sweep meets")
 
 struct Tree {
   LINDEN_FIELDS(LINDEN_TREE_FIELDS)

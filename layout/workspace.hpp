@@ -13,6 +13,7 @@ namespace linden {
   FIELD(Scalar, displacement, 7, slots, "dT = T(k)^-1 T(k+1); quaternion x y z w, shift [m], body frame")              \
   FIELD(Scalar, twist, 6, slots, "h V = log dT: angular [rad], linear [m], body frame")                                \
   FIELD(Scalar, body_momentum, 6, slots, "G h V: angular [kg m^2], linear [kg m]")                                     \
+  FIELD(Scalar, turn, 3, slots, "angular part of h V [rad]")                                                           \
   FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
   FIELD(Scalar, articulated, 36, slots, "Pi (exact Newton) or articulated inertia: four 3 x 3 blocks, row by row")     \
   FIELD(Scalar, gain_up, 6, velocities, "Pi S d^-1, one row a degree of freedom")                                      \

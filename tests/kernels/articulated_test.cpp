@@ -26,6 +26,22 @@ MatrixXd inverse_block(const Field<double>& inverse, Index first, Index count) {
   return block;
 }
 
+/// The sweeps' own functions work on 36 numbers in memory.
+template <JointKind Kind>
+Mat6<double> without_joint(Joint<Kind> joint, const Model& model, Index i, const Mat6<double>& A, const Gains<double>& gains) {
+  std::array<double, 36> numbers, felt;
+  A.to(numbers.data());
+  eliminate_joint(joint, model.tree, model.constants, i, numbers.data(), gains, felt.data());
+  return Mat6<double>::from(felt.data());
+}
+
+Mat6<double> in_parent(const Placement<double>& X, const Placement<double>& X_pose, const Mat6<double>& A) {
+  std::array<double, 36> numbers, result;
+  A.to(numbers.data());
+  to_parent(X, X_pose, numbers.data(), [&](int at, double value) { result[static_cast<std::size_t>(at)] = value; });
+  return Mat6<double>::from(result.data());
+}
+
 TEST_CASE("a joint taken out of a 6 x 6 matrix leaves A - A S d^-1 S^T A and its gains, symmetric or not") {
   Random random(1);
   double worst = 0;
@@ -34,7 +50,7 @@ TEST_CASE("a joint taken out of a 6 x 6 matrix leaves A - A S d^-1 S^T A and its
     Rig<double> rig(model);
     down(model.tree, [&](auto joint, Index i) {
       const Mat6<double> A = random_matrix6(random);
-      const Mat6<double> felt = eliminate_joint(joint, model.tree, model.constants, i, A, rig.gains());
+      const Mat6<double> felt = without_joint(joint, model, i, A, rig.gains());
       const Matrix6 dense = eigen(A);
       const MatrixXd S = tree.body(i).S;
       const MatrixXd inverse = (S.transpose() * dense * S).inverse();
@@ -66,7 +82,7 @@ TEST_CASE("a free joint passes on exactly nothing, a ball joint exactly no momen
   int balls = 0, frees = 0;
   down(model.tree, [&](auto joint, Index i) {
     const Matrix6 felt =
-        eigen(eliminate_joint(joint, model.tree, model.constants, i, random_matrix6(random), rig.gains()));
+        eigen(without_joint(joint, model, i, random_matrix6(random), rig.gains()));
     if constexpr (joint == JointKind::free) CHECK(felt.isZero(0));
     if constexpr (joint == JointKind::ball) CHECK((felt.topRows<3>().isZero(0) && felt.leftCols<3>().isZero(0)));
     balls += joint == JointKind::ball ? 1 : 0;
@@ -87,7 +103,7 @@ TEST_CASE("a hinge with inertia 4 about its axis has the gains of a hinge") {
   A(2, 0) = 2;  // row z
   A(5, 2) = 8;  // column z
   const Matrix6 felt =
-      eigen(eliminate_joint(Joint<JointKind::screw>{}, model.tree, model.constants, 1, mat6(A), rig.gains()));
+      eigen(without_joint(Joint<JointKind::screw>{}, model, 1, mat6(A), rig.gains()));
   CHECK(rig.work.joint_inverse(0) == 0.25);
   CHECK((rig.work.gain_up(0, 2) == 1 && rig.work.gain_up(0, 5) == 2 && rig.work.gain_up(0, 0) == 0));
   CHECK((rig.work.gain_down(0, 2) == 1 && rig.work.gain_down(0, 0) == 0.5 && rig.work.gain_down(0, 5) == 0));
@@ -97,20 +113,23 @@ TEST_CASE("a hinge with inertia 4 about its axis has the gains of a hinge") {
 TEST_CASE("a 6 x 6 matrix changes frames by adjoints from both sides") {
   Random random(3);
   for (int sample = 0; sample < 50; ++sample) {
-    const Placement<double> X = random_placement(random);
+    const Placement<double> X = random_placement(random), X_pose = random_placement(random);
     const Mat6<double> A = random_matrix6(random);
-    const Matrix6 down_adjoint = reference::adjoint<double>(reference::inverse<double>(eigen(X)));
-    CHECK(relative_error(eigen(to_parent(X, A)), down_adjoint.transpose() * eigen(A) * down_adjoint) < 8 * kEpsilon);
+    const Matrix6 impulses = reference::adjoint<double>(reference::inverse<double>(eigen(X)));
+    const Matrix6 poses = reference::adjoint<double>(reference::inverse<double>(eigen(X_pose)));
+    CHECK(relative_error(eigen(in_parent(X, X_pose, A)), impulses.transpose() * eigen(A) * poses) < 8 * kEpsilon);
   }
 }
 
-TEST_CASE("a 6 x 6 matrix is spread row by row") {
+TEST_CASE("rows and columns of a 6 x 6 matrix are found where a Mat6 keeps them") {
   Random random(4);
   const Mat6<double> A = random_matrix6(random);
-  const std::array<double, 36> numbers = to_array(A);
+  std::array<double, 36> numbers;
+  A.to(numbers.data());
   const Matrix6 dense = eigen(A);
-  for (int r = 0; r < 6; ++r) {
-    for (int c = 0; c < 6; ++c) CHECK(numbers[static_cast<std::size_t>(6 * r + c)] == dense(r, c));
+  for (int k = 0; k < 6; ++k) {
+    CHECK(eigen(load_row(numbers.data() + row_start(k))) == dense.row(k).transpose());
+    CHECK(eigen(load_column(numbers.data() + column_start(k))) == dense.col(k));
   }
 }
 
@@ -120,9 +139,11 @@ TEST_CASE("eliminating joints writes every gain, allocates nothing and gives equ
                   [](auto& rig) {
                     down(rig.tree, [&](auto joint, Index i) {
                       using S = std::decay_t<decltype(rig.h)>;
-                      const auto A = load<Mat6, S>(rig.work.articulated, i);
-                      const Mat6<S> felt = eliminate_joint(joint, rig.tree, rig.constants, i, A, rig.gains());
-                      store(rig.work.articulated, i, to_parent(load<Placement, S>(rig.work.placement, i), felt));
+                      S felt[36];
+                      S* const A = rig.work.articulated.row(i);
+                      eliminate_joint(joint, rig.tree, rig.constants, i, A, rig.gains(), felt);
+                      const auto X = load<Placement, S>(rig.work.placement, i);
+                      to_parent(X, X, felt, [&](int at, const S& value) { A[at] = value; });
                     });
                   },
                   {"gain_up", "gain_down", "joint_inverse"}, {"articulated"});

@@ -16,8 +16,8 @@ const auto target = make_kernel(
 
 const auto update = make_kernel([](auto& rig) { find_residual(rig); },
                                 [](auto& rig) {
-                                  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.right_side,
-                                                      rig.work.residual, rig.work.force, rig.state.p);
+                                  momentum_update_map(rig.tree, rig.constants, rig.h, rig.work.displacement,
+                                                      rig.work.impulse, rig.work.residual, rig.work.force, rig.state.p);
                                 },
                                 {"p"});
 
@@ -25,15 +25,13 @@ const auto update = make_kernel([](auto& rig) { find_residual(rig); },
 void finish(Rig<double>& rig) {
   fill(rig.work.force, VectorXd::Zero(rig.tree.shape.velocities));
   find_residual(rig);
-  end_momentum_map(rig.tree, rig.work.twist, rig.work.body_momentum, rig.work.impulse);
   advance_map(rig.tree, rig.work.motion, rig.work.delta, rig.state.q);
   placement_map(rig.tree, rig.constants, rig.state.q, rig.work.placement);
-  impulse_up(rig.tree, rig.constants, rig.work.placement, rig.work.impulse, rig.work.increment);
-  momentum_update_map(rig.tree, rig.h, rig.work.displacement, rig.work.increment, rig.work.residual, rig.work.force,
-                      rig.state.p);
+  momentum_update_map(rig.tree, rig.constants, rig.h, rig.work.displacement, rig.work.impulse, rig.work.residual,
+                      rig.work.force, rig.state.p);
 }
 
-TEST_CASE("the target is h (p + h/2 Q), and the update (projected - C r) / h + h/2 Q") {
+TEST_CASE("the target is h (p + h/2 Q), and the update (S^T Ad_dT^T F - C r) / h + h/2 Q") {
   double worst = 0;
   for (const Model& model : mixed_trees()) {
     const PlainTree tree = reference::plain_tree(model);
@@ -47,23 +45,24 @@ TEST_CASE("the target is h (p + h/2 Q), and the update (projected - C r) / h + h
 
     update.prepare(rig);
     update.run(rig);
-    VectorXd p = instance.right_side;
+    VectorXd p(tree.velocities);
     const VectorXd residual = vector(rig.work.residual);
     for (Index i = 1; i < tree.slots(); ++i) {
       const PlainBody& body = tree.body(i);
+      const auto Ad = reference::adjoint<double>(row<Displacement>(rig.work.displacement, i));
+      p.segment(body.v, body.dofs()) = body.S.transpose() * Ad.transpose() * row<Wrench>(rig.work.impulse, i);
       if (body.kind == JointKind::screw) {
         p[body.v] -= residual[body.v];
         continue;
       }
       // the rows of S^T Ad_dT^T S: all of it for a free joint, the turn alone for a ball
-      const auto Ad = reference::adjoint<double>(row<Displacement>(rig.work.displacement, i));
       p.segment(body.v, body.dofs()) -=
           body.S.transpose() * Ad.transpose() * body.S * residual.segment(body.v, body.dofs());
     }
     see(worst, relative_error(vector(rig.state.p), p / h + h / 2 * instance.force));
   }
   INFO("worst relative error: " << worst / kEpsilon << " epsilon");
-  CHECK(worst < 16 * kEpsilon);
+  CHECK(worst < 64 * kEpsilon);
 }
 
 TEST_CASE("the momentum at the end of a solved step is the derivative of the discrete action by its end") {

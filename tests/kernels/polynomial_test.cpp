@@ -86,6 +86,33 @@ void check_all(double bound) {
       [](long double x) { return alpha_series(x, 2); });
 }
 
+/// The short series, up to kSmallTurn.
+template <class S>
+void check_small(double bound, double slope_bound) {
+  const auto check = [&](const char* name, double top, double most, auto found, auto truth) {
+    const double worst = worst_error<S>(top, found, truth);
+    INFO(name << ": worst relative error " << worst << " epsilon");
+    CHECK(worst <= most);
+  };
+  const double x = kSmallTurn * kSmallTurn, ss = 1 - kSmallTurnCosine * kSmallTurnCosine;
+  check("small_angle_over_sine", ss, bound, [](S y) { return small_angle_over_sine(y); }, [](long double y) {
+    const long double s = std::sqrt(y);
+    return s > 0 ? 2 * std::asin(s) / s : 2.0L;
+  });
+  check("small_alpha", x, bound, [](S y) { return small_alpha(y); }, [](long double y) { return alpha_series(y, 0); });
+  check("small_alpha_slope", x, slope_bound, [](S y) { return small_alpha_slope(y); },
+        [](long double y) { return alpha_series(y, 1); });
+}
+
+TEST_CASE("the short series are within two epsilon of their functions, the slope within what it is multiplied by") {
+  check_small<double>(2, 2.5e-13 / kEpsilon);
+  CHECK(kSmallTurnCosine == Approx(std::cos(kSmallTurn / 2)).epsilon(1e-16));
+}
+
+TEST_CASE("the short series of single precision leave what rounding of the rest covers") {
+  check_small<float>(3, 3e-3 / 1.2e-7);
+}
+
 TEST_CASE("every polynomial is within two epsilon of its function over the whole range") { check_all<double>(2); }
 
 TEST_CASE("every polynomial is within three epsilon of its function in float too") { check_all<float>(3); }

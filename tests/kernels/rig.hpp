@@ -198,8 +198,9 @@ inline bool contains(const std::vector<std::string>& names, std::string_view nam
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+/// `with_world`: fields whose row 0, the world's, is written too; in others it is left alone.
 template <class Prepare, class Run>
-void check_writes(const Kernel<Prepare, Run>& kernel) {
+void check_writes(const Kernel<Prepare, Run>& kernel, const std::vector<std::string>& with_world = {}) {
   std::vector<std::string> changed;
   for (const Model& model : mixed_trees()) {
     Rig<double> rig(model);
@@ -219,15 +220,17 @@ void check_writes(const Kernel<Prepare, Run>& kernel) {
       const std::size_t width = field.flat().size() / static_cast<std::size_t>(field.rows());
       const bool output = contains(kernel.writes, name) || contains(kernel.changes, name);
       outputs += output ? 1 : 0;
-      // row 0 of a field of slots is the world's: most maps leave it alone
-      const std::size_t begin = output && rows == Rows::slots ? width : 0;
-      bool complete = true, untouched = true;
-      for (std::size_t k = begin; k < was.size(); ++k) {
-        complete = complete && std::isfinite(field.flat()[k]);
-        untouched = untouched && same_bits(field.flat()[k], was[k]);
+      const bool world = rows != Rows::slots || contains(with_world, name);
+      bool complete = true, untouched = true, world_untouched = true;
+      for (std::size_t k = 0; k < was.size(); ++k) {
+        const bool same = same_bits(field.flat()[k], was[k]);
+        complete = complete && (std::isfinite(field.flat()[k]) || (k < width && !world));
+        untouched = untouched && same;
+        world_untouched = world_untouched && (same || k >= width);
       }
       INFO(model.names.model << ": " << name);
       if (output) {
+        CHECK((world || world_untouched));
         CHECK(complete);
         if (!untouched) changed.push_back(name);
       } else {

@@ -126,7 +126,7 @@ void check_log(double gap, double bound) {
 template <class S>
 void check_dlog(double gap, double bound) {
   Random random(23);
-  Worst<S> angular, linear, moment, force, moment_back, force_back;
+  Worst<S> angular, linear, moment, force, moment_back, force_back, moment_moved, force_moved;
   for (const Twist<S>& u : sample_twists<S>(4000, gap)) {
     const Long66 D = reference::dlog<long double>(exact(u)), back = reference::dlog<long double>(-exact(u));
     const Twist<S> y{rounded<S>(random_vec3(random, 1)), rounded<S>(random_vec3(random, 1))};
@@ -138,8 +138,7 @@ void check_dlog(double gap, double bound) {
                (D.topLeftCorner<3, 3>() * exact(y.v)).norm() + (D.bottomLeftCorner<3, 3>() * exact(y.w)).norm());
 
     const Wrench<S> m{y.w, y.v};
-    const TransposedDlog<S> both = dlog_transpose(u, m);
-    const Wrench<S> mu = both.even + both.odd, nu = both.even - both.odd;
+    const Wrench<S> mu = dlog_transpose(Logarithm<S>(u), m), nu = dlog_transpose(Logarithm<S>(S(-1) * u), m);
     const auto see = [&](const Wrench<S>& F, const Long66& by, Worst<S>& n, Worst<S>& f) {
       f.see(F.f, by.bottomRightCorner<3, 3>().transpose() * exact(m.f));
       const Long3 turned = by.topLeftCorner<3, 3>().transpose() * exact(m.n);
@@ -148,6 +147,7 @@ void check_dlog(double gap, double bound) {
     };
     see(mu, D, moment, force);
     see(nu, back, moment_back, force_back);
+    see(dlog_transpose(Logarithm<S>(exp(u)), m), D, moment_moved, force_moved);
   }
   angular.check("dlog, angular", bound);
   linear.check("dlog, linear", bound);
@@ -155,6 +155,9 @@ void check_dlog(double gap, double bound) {
   force.check("dlog transposed, force", bound);
   moment_back.check("dlog of -u transposed, moment", bound);
   force_back.check("dlog of -u transposed, force", bound);
+  // with the rounding of exp and log before it
+  moment_moved.check("dlog transposed of a displacement, moment", 2 * bound);
+  force_moved.check("dlog transposed of a displacement, force", 2 * bound);
 }
 
 TEST_CASE("exp has relative errors of a few epsilon from 1e-300 to pi - 1e-9") { check_exp<double>(1e-9, 6); }
@@ -226,8 +229,8 @@ TEST_CASE("dlog at a pure shift is I - 1/2 ad and a wrench carried to the step's
   Random random(29);
   double worst = 0;
   for (const Twist<double>& u : sample_twists<double>(1000, 1e-3)) {
-    const TransposedDlog<double> both = dlog_transpose(u, random_wrench(random, 1));
-    const Wrench<double> mu = both.even + both.odd, nu = both.even - both.odd;
+    const Wrench<double> m = random_wrench(random, 1);
+    const Wrench<double> mu = dlog_transpose(Logarithm<double>(u), m), nu = dlog_transpose(Logarithm<double>(-1.0 * u), m);
     see(worst, relative_error(eigen(carried(exp(u), mu)), eigen(nu)));
   }
   INFO("worst relative difference between Ad_exp(u)^T mu and nu: " << worst / kEpsilon << " epsilon");
@@ -243,8 +246,7 @@ reference::Matrix6<double> varied_momentum(const Inertia<double>& G, const Twist
   const Inertia<T> wide_G{G.m, wide(G.mc), G.xx, G.xy, G.xz, G.yy, G.yz, G.zz};
   const Twist<T> eta{{T(0, 0), T(0, 1), T(0, 2)}, {T(0, 3), T(0, 4), T(0, 5)}};
   const Twist<T> moved = log(exp(Twist<T>{wide(u.w), wide(u.v)}) * exp(eta));
-  const TransposedDlog<T> both = dlog_transpose(moved, wide_G * moved);
-  const reference::Vector6<T> mu = eigen(both.even + both.odd);
+  const reference::Vector6<T> mu = eigen(dlog_transpose(Logarithm<T>(moved), wide_G * moved));
   reference::Matrix6<double> K;
   for (int row = 0; row < 6; ++row) {
     for (std::size_t column = 0; column < 6; ++column) K(row, static_cast<int>(column)) = mu[row].slope[column];
@@ -304,6 +306,18 @@ TEST_CASE("pose_derivative at rest is the inertia, and to first order what the p
   }
 }
 
+TEST_CASE("pose_derivative to first order leaves out what is quadratic in the turn") {
+  Random random(37);
+  for (const double size : {1e-1, 1e-2, 1e-3, 1e-4}) {
+    const Twist<double> u{random_direction(random, size), random_direction(random, size)};
+    const Inertia<double> G = random_inertia(random);
+    const reference::Matrix6<double> K = eigen(pose_derivative(G, u, G * u));
+    const reference::Matrix6<double> difference = eigen(pose_derivative_first_order(G, u.w)) - K;
+    CHECK(difference.norm() < size * size * K.norm());
+    CHECK(difference.norm() > 1e-3 * size * size * K.norm());
+  }
+}
+
 TEST_CASE("exp, log, dlog and pose_derivative give equal bits in every lane and allocate nothing") {
   Random random(41);
   std::vector<std::array<double, 16>> samples;
@@ -322,7 +336,8 @@ TEST_CASE("exp, log, dlog and pose_derivative give equal bits in every lane and 
         using S = std::decay_t<decltype(in[0])>;
         const auto u = unpacked<Twist<S>>(in, 0);
         const auto G = unpacked<Inertia<S>>(in, 6);
-        return joined(numbers_of<S>(dlog_transpose(u, G * u)), numbers_of<S>(pose_derivative(G, u, G * u)));
+        return joined(numbers_of<S>(dlog_transpose(Logarithm<S>(exp(u)), G * u)), numbers_of<S>(pose_derivative(G, u, G * u)),
+                      numbers_of<S>(pose_derivative_first_order(G, u.w)));
       },
       samples, 64 * kEpsilon);
 }

@@ -11,6 +11,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "kernels/sincos.hpp"
+
 namespace linden::reference {
 
 template <int N>
@@ -75,6 +77,7 @@ struct Dual {
   }
   friend Dual sin(const Dual& a) { return chain(std::sin(a.value), std::cos(a.value), a); }
   friend Dual cos(const Dual& a) { return chain(std::cos(a.value), -std::sin(a.value), a); }
+  friend SinCos<Dual> sin_cos(const Dual& a) { return {sin(a), cos(a)}; }
   friend Dual atan(const Dual& a) { return chain(std::atan(a.value), 1 / (1 + a.value * a.value), a); }
   friend Dual atan2(const Dual& y, const Dual& x) {
     const double square = x.value * x.value + y.value * y.value;

@@ -1,0 +1,369 @@
+#include "engine/batch.hpp"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "engine/instance_stepper.hpp"
+#include "layout/input_error.hpp"
+#include "layout/packed_history.hpp"
+
+namespace linden {
+namespace {
+
+constexpr Index kMassRows = 11;  // a slot: inertia, subtree mass
+
+void check_batch(std::int64_t size, const BatchOptions& options) {
+  check(options);
+  constexpr std::int64_t most = 1'000'000'000;
+  if (size < 1 || size > most) throw InputError(fmt::format("{} instances; expected 1 to {}", size, most));
+  if (options.threads < 0 || options.threads > 4096) {
+    throw InputError(fmt::format("{} threads; expected 1 to 4096, or 0 for all there are", options.threads));
+  }
+  const auto refuse = [](const char* what, std::string_view found, std::string_view only) {
+    throw InputError(fmt::format("a batch has no {} \"{}\"; it knows \"{}\" (a Simulation has them all)", what, found, only));
+  };
+  if (options.solver != Solver::newton) refuse("solver", name(options.solver), name(Solver::newton));
+  if (options.guess != FirstGuess::extrapolation) refuse("first guess", name(options.guess), name(FirstGuess::extrapolation));
+  if (options.stop != StopTest::energy) refuse("stop test", name(options.stop), name(StopTest::energy));
+  if (options.instructions && !available(*options.instructions)) {
+    throw InputError(fmt::format("this processor or this build of linden has no {} instructions; the best there is: {}",
+                                 name(*options.instructions), name(best_instructions())));
+  }
+}
+
+template <class Real>
+BodyConstants<Real> rounded(const BodyConstants<double>& from, const Shape& shape) {
+  BodyConstants<Real> to;
+  to.allocate(shape);
+  const auto copy = [](const auto& source, auto& target) {
+    std::ranges::transform(source.flat(), target.flat().begin(), [](double value) { return static_cast<Real>(value); });
+  };
+  copy(from.screw, to.screw);
+  copy(from.tree_placement, to.tree_placement);
+  copy(from.inertia, to.inertia);
+  copy(from.subtree_mass, to.subtree_mass);
+  return to;
+}
+
+template <class Real>
+std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockSetup<Real>& setup) {
+  switch (instructions) {
+#ifdef LINDEN_X86
+    case Instructions::avx512: return make_block_stepper<Instructions::avx512>(setup);
+    case Instructions::avx2: return make_block_stepper<Instructions::avx2>(setup);
+#endif
+    case Instructions::baseline: return make_block_stepper<Instructions::baseline>(setup);
+    default: return make_block_stepper<Instructions::scalar>(setup);
+  }
+}
+
+template <class T>
+using Numbers = std::vector<T, AlignedAllocator<T>>;
+
+}  // namespace
+
+template <class Real>
+struct BatchOf<Real>::Data {
+  /// What a thread works with.
+  struct Worker {
+    std::unique_ptr<BlockStepper<Real>> block;
+    std::unique_ptr<InstanceStepper> instance;
+  };
+
+  std::shared_ptr<const Model> model;
+  BodyConstants<Real> constants;
+  BatchOptions options;
+  std::int64_t size, blocks;
+  Instructions instructions;
+  int lanes;
+  int threads;
+  Numbers<Real> q, p, pace, applied, mass;
+  Numbers<std::uint32_t> past;
+  std::vector<InstanceRecord> records;
+  oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
+  mutable oneapi::tbb::task_arena arena;
+  mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
+
+  Data(std::shared_ptr<const Model> shared, std::int64_t count, const BatchOptions& given)
+      : model(std::move(shared)), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
+        instructions(given.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
+        threads(given.threads > 0 ? given.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
+        allowed(oneapi::tbb::global_control::max_allowed_parallelism,
+                std::max(static_cast<std::size_t>(threads),
+                         oneapi::tbb::global_control::active_value(oneapi::tbb::global_control::max_allowed_parallelism))),
+        arena(threads) {
+    blocks = (size + lanes - 1) / lanes;
+    const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
+    q.resize(rows(shape().positions));
+    p.resize(rows(shape().velocities));
+    past.resize(rows(shape().velocities * kHistoryWords<Real>));
+    pace.assign(rows(2), std::numeric_limits<Real>::quiet_NaN());
+    records.resize(static_cast<std::size_t>(size));
+    const std::vector<double> neutral = model->neutral();
+    for_blocks([&](std::int64_t b, Worker&) {
+      Real* to = q.data() + at(b, shape().positions);
+      for (const double value : neutral) {
+        for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(value);
+      }
+    });
+  }
+
+  const Shape& shape() const { return model->tree.shape; }
+  std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
+
+  Block<Real> block(std::int64_t b) {
+    const Index nv = shape().velocities;
+    return {q.data() + at(b, shape().positions),
+            p.data() + at(b, nv),
+            past.data() + at(b, nv * kHistoryWords<Real>),
+            pace.data() + at(b, 2),
+            applied.empty() ? nullptr : applied.data() + at(b, nv),
+            mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
+            records.data() + b * lanes,
+            static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
+  }
+
+  Worker& worker() const {
+    Worker& mine = workers.local();
+    if (!mine.block) {
+      mine.block = make<Real>(instructions, {*model, constants, options, !mass.empty()});
+      mine.instance = std::make_unique<InstanceStepper>(*model, options);
+    }
+    return mine;
+  }
+
+  /// work(block, worker) for every block, on all threads.
+  template <class Work>
+  void for_blocks(const Work& work) const {
+    arena.execute([&] {
+      oneapi::tbb::parallel_for(std::int64_t{0}, blocks, [&](std::int64_t b) { work(b, worker()); });
+    });
+  }
+
+  Real* mass_row(std::int64_t i, Index slot) {
+    return mass.data() + at(i / lanes, shape().slots * kMassRows) + static_cast<std::size_t>(slot * kMassRows * lanes + i % lanes);
+  }
+
+  void check_instance(std::int64_t i) const {
+    if (i < 0 || i >= size) throw InputError(fmt::format("there is no instance {}: they go from 0 to {}", i, size - 1));
+  }
+
+  void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
+    std::ranges::copy(positions, alone.state().q.flat().begin());
+    normalise_positions(*model, alone.state().q.flat());
+    for (std::size_t k = 0; k < velocities.size(); ++k) {
+      if (!std::isfinite(velocities[k])) throw InputError(fmt::format("velocity \"{}\" is {}", model->names.velocity[k], velocities[k]));
+    }
+    if (!mass.empty()) {
+      Field<double, 10>& inertia = alone.own_constants().inertia;
+      for (Index slot = 0; slot < inertia.rows(); ++slot) {
+        for (int k = 0; k < 10; ++k) inertia(slot, k) = static_cast<double>(mass_row(i, slot)[k * lanes]);
+      }
+    }
+    alone.set_velocities(velocities);
+    const BatchView<Real> to_q(q, shape().positions, lanes), to_p(p, shape().velocities, lanes), to_pace(pace, 2, lanes);
+    for (Index row = 0; row < shape().positions; ++row) to_q(i, row) = static_cast<Real>(alone.state().q(row));
+    for (Index row = 0; row < shape().velocities; ++row) to_p(i, row) = static_cast<Real>(alone.state().p(row));
+    for (Index row = 0; row < 2; ++row) to_pace(i, row) = std::numeric_limits<Real>::quiet_NaN();
+    const BatchView<std::uint32_t> to_past(past, shape().velocities * kHistoryWords<Real>, lanes);
+    for (Index row = 0; row < to_past.rows(); ++row) to_past(i, row) = 0;
+    records[static_cast<std::size_t>(i)] = {};
+  }
+};
+
+template <class Real>
+BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& options)
+    : BatchOf(std::make_shared<const Model>(std::move(model)), size, options) {}
+
+template <class Real>
+BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options) {
+  check_batch(size, options);
+  data_ = std::make_unique<Data>(std::move(model), size, options);
+}
+
+template <class Real>
+BatchOf<Real>::~BatchOf() = default;
+template <class Real>
+BatchOf<Real>::BatchOf(BatchOf&&) noexcept = default;
+template <class Real>
+BatchOf<Real>& BatchOf<Real>::operator=(BatchOf&&) noexcept = default;
+
+template <class Real>
+const Model& BatchOf<Real>::model() const {
+  return *data_->model;
+}
+template <class Real>
+const BatchOptions& BatchOf<Real>::options() const {
+  return data_->options;
+}
+template <class Real>
+std::int64_t BatchOf<Real>::size() const {
+  return data_->size;
+}
+template <class Real>
+int BatchOf<Real>::lanes() const {
+  return data_->lanes;
+}
+template <class Real>
+int BatchOf<Real>::threads() const {
+  return data_->threads;
+}
+template <class Real>
+Instructions BatchOf<Real>::instructions() const {
+  return data_->instructions;
+}
+
+template <class Real>
+void BatchOf<Real>::reset(std::int64_t i, std::span<const double> positions, std::span<const double> velocities) {
+  data_->check_instance(i);
+  const auto check_count = [&](const char* what, std::size_t found, Index expected) {
+    if (found == static_cast<std::size_t>(expected)) return;
+    throw InputError(fmt::format("{}: {} numbers given for model \"{}\", expected {}", what, found, model().names.model, expected));
+  };
+  check_count("positions", positions.size(), data_->shape().positions);
+  check_count("velocities", velocities.size(), data_->shape().velocities);
+  data_->start(i, positions, velocities, *data_->worker().instance);
+}
+
+template <class Real>
+void BatchOf<Real>::reset_all(
+    const std::function<void(std::int64_t i, std::span<double> positions, std::span<double> velocities)>& start) {
+  const std::vector<double> neutral = model().neutral();
+  data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) {
+    std::vector<double> positions, velocities;
+    for (std::int64_t i = b * lanes(); i < std::min((b + 1) * lanes(), size()); ++i) {
+      positions = neutral;
+      velocities.assign(static_cast<std::size_t>(data_->shape().velocities), 0.0);
+      start(i, positions, velocities);
+      data_->start(i, positions, velocities, *worker.instance);
+    }
+  });
+}
+
+template <class Real>
+BatchView<Real> BatchOf<Real>::forces() {
+  if (data_->applied.empty()) data_->applied.assign(data_->p.size(), Real(0));
+  return {data_->applied, data_->shape().velocities, lanes()};
+}
+
+template <class Real>
+void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<double, 10>& inertia) {
+  data_->check_instance(i);
+  const Tree& tree = model().tree;
+  if (slot < 1 || slot >= tree.shape.slots) throw InputError(fmt::format("there is no body {}: they go from 1 to {}", slot, tree.bodies()));
+  // a body's 6 x 6 inertia is positive semidefinite where its inertia about the centre of mass is
+  const double m = inertia[0];
+  const Eigen::Vector3d mc(inertia[1], inertia[2], inertia[3]);
+  Eigen::Matrix3d I;
+  I << inertia[4], inertia[5], inertia[6], inertia[5], inertia[7], inertia[8], inertia[6], inertia[8], inertia[9];
+  const bool finite = std::ranges::all_of(inertia, [](double value) { return std::isfinite(value); });
+  if (finite && m > 0) I -= (mc.squaredNorm() * Eigen::Matrix3d::Identity() - mc * mc.transpose()) / m;
+  if (!finite || m < 0 || (m == 0 && !(mc.isZero(0))) ||
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I).eigenvalues()[0] < -1e-9 * (I.norm() + 1e-300)) {
+    throw InputError(fmt::format("instance {}, body \"{}\": mass {} and its moments are no body's: expected finite numbers, a mass that is "
+                                 "not negative and an inertia about the centre of mass that is positive definite",
+                                 i, model().names.body[static_cast<std::size_t>(slot)], m));
+  }
+  if (data_->mass.empty()) {
+    data_->mass.resize(data_->at(data_->blocks, tree.shape.slots * kMassRows));
+    data_->for_blocks([&](std::int64_t b, typename Data::Worker&) {
+      Real* to = data_->mass.data() + data_->at(b, tree.shape.slots * kMassRows);
+      for (Index body = 0; body < tree.shape.slots; ++body) {
+        for (Index k = 0; k < kMassRows; ++k) {
+          const Real value = k < 10 ? data_->constants.inertia(body, static_cast<int>(k)) : data_->constants.subtree_mass(body);
+          for (int l = 0; l < lanes(); ++l) *to++ = value;
+        }
+      }
+    });
+    data_->workers.clear();  // theirs share the model's masses
+  }
+  const double more = m - static_cast<double>(data_->mass_row(i, slot)[0]);
+  for (std::size_t k = 0; k < 10; ++k) data_->mass_row(i, slot)[k * static_cast<std::size_t>(lanes())] = static_cast<Real>(inertia[k]);
+  for (Index body = slot;; body = tree.parent(body)) {
+    Real& sum = data_->mass_row(i, body)[10 * lanes()];
+    sum = static_cast<Real>(static_cast<double>(sum) + more);
+    if (body == 0) break;
+  }
+}
+
+template <class Real>
+std::array<double, 10> BatchOf<Real>::inertia(std::int64_t i, Index slot) const {
+  data_->check_instance(i);
+  std::array<double, 10> result;
+  for (std::size_t k = 0; k < 10; ++k) {
+    result[k] = data_->mass.empty() ? model().constants.inertia(slot, static_cast<int>(k))
+                                    : static_cast<double>(data_->mass_row(i, slot)[k * static_cast<std::size_t>(lanes())]);
+  }
+  return result;
+}
+
+template <class Real>
+void BatchOf<Real>::step(std::int64_t n) {
+  data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) { worker.block->step(data_->block(b), n); });
+}
+
+template <class Real>
+BatchView<const Real> BatchOf<Real>::positions() const {
+  return {data_->q, data_->shape().positions, lanes()};
+}
+template <class Real>
+BatchView<const Real> BatchOf<Real>::momenta() const {
+  return {data_->p, data_->shape().velocities, lanes()};
+}
+
+template <class Real>
+typename BatchOf<Real>::Observation BatchOf<Real>::observe() const {
+  const Index nv = data_->shape().velocities;
+  Observation seen{std::vector<Real>(data_->p.size()), std::vector<Real>(data_->pace.size()), nv, lanes()};
+  data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) {
+    worker.block->observe(data_->block(b), seen.velocity_numbers.data() + data_->at(b, nv), seen.energy_numbers.data() + data_->at(b, 2));
+  });
+  return seen;
+}
+
+template <class Real>
+const InstanceRecord& BatchOf<Real>::record(std::int64_t i) const {
+  data_->check_instance(i);
+  return data_->records[static_cast<std::size_t>(i)];
+}
+
+template <class Real>
+BatchSummary BatchOf<Real>::summary() const {
+  BatchSummary sum;
+  for (const InstanceRecord& record : data_->records) {
+    sum.frozen += record.status != StepStatus::converged ? 1 : 0;
+    sum.steps += record.steps;
+    sum.evaluations += record.evaluations;
+    sum.rescued += record.rescued;
+  }
+  return sum;
+}
+
+template <class Real>
+std::string BatchOf<Real>::describe(std::int64_t i) const {
+  const InstanceRecord& instance = record(i);
+  StepReport report;
+  report.status = instance.status;
+  report.slot = instance.slot;
+  report.residual = instance.residual;
+  return linden::describe(report, model(), options().step);
+}
+
+template <class Real>
+std::size_t BatchOf<Real>::bytes() const {
+  return (data_->q.size() + data_->p.size() + data_->pace.size() + data_->applied.size() + data_->mass.size()) * sizeof(Real) +
+         data_->past.size() * sizeof(std::uint32_t) + data_->records.size() * sizeof(InstanceRecord);
+}
+
+template class BatchOf<double>;
+template class BatchOf<float>;
+
+}  // namespace linden

@@ -1,0 +1,139 @@
+// engine/batch.hpp
+// N instances of one model in time: rollouts over lanes and threads.
+//
+//   Batch batch(load_urdf("models/humanoid.urdf", Base::floating), 4096, {.step = 1e-3});
+//   for (std::int64_t i = 0; i < batch.size(); ++i) batch.reset(i, q, v);
+//   batch.step(100);
+//   batch.positions().instance(7)     Eigen vector of instance 7, no copy
+//   batch.record(7).status            an instance whose step failed is frozen at its last good state
+//
+// Memory is [block][row][lane]: a block of W instances, W the lanes of the processor's registers, lies together, so that a thread takes it
+// through many steps without leaving its cache. Positions, momenta and one number more a degree of freedom and instance are all
+// that is kept.
+//
+// Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
+// into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
+//
+// Models with mimic joints are stepped an instance at a time, on all threads but without lanes.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "engine/block_stepper.hpp"
+
+namespace linden {
+
+struct BatchOptions : Options {
+  int threads = 0;                           // 0: all that the machine has
+  std::optional<Instructions> instructions;  // none: the best that the processor has
+};
+
+/// All instances' rows of one quantity where they lie: [block][row][lane].
+template <class Number>
+class BatchView {
+ public:
+  using Real = std::remove_const_t<Number>;
+  using Vector = std::conditional_t<std::is_const_v<Number>, const Eigen::VectorX<Real>, Eigen::VectorX<Real>>;
+
+  BatchView(std::span<Number> flat, Index rows, int lanes) : flat_(flat), rows_(rows), lanes_(lanes) {}
+
+  Index rows() const { return rows_; }
+  int lanes() const { return lanes_; }
+  Number& operator()(std::int64_t instance, Index row) const { return flat_[offset(instance) + static_cast<std::size_t>(row * lanes_)]; }
+  /// One instance's rows, a strided Eigen vector.
+  Eigen::Map<Vector, 0, Eigen::InnerStride<>> instance(std::int64_t instance) const {
+    return {flat_.data() + offset(instance), rows_, Eigen::InnerStride<>(lanes_)};
+  }
+  /// Everything, lanes of the last block that hold no instance included.
+  std::span<Number> flat() const { return flat_; }
+
+ private:
+  std::size_t offset(std::int64_t instance) const {
+    const auto block = static_cast<std::size_t>(instance / lanes_), lane = static_cast<std::size_t>(instance % lanes_);
+    return block * static_cast<std::size_t>(rows_) * static_cast<std::size_t>(lanes_) + lane;
+  }
+  std::span<Number> flat_;
+  Index rows_;
+  int lanes_;
+};
+
+/// Sums over all instances since the start.
+struct BatchSummary {
+  std::int64_t frozen = 0;
+  std::int64_t steps = 0;
+  std::int64_t evaluations = 0;  // of the residual
+  std::int64_t rescued = 0;      // steps taken alone
+};
+
+template <class Real>
+class BatchOf {
+ public:
+  /// Every instance at rest in the model's zero configuration. Throws InputError for options that make no sense or that a batch does not
+  /// have: it solves by Newton's method, starts from extrapolation and stops by energy.
+  BatchOf(Model model, std::int64_t size, const BatchOptions& options = {});
+  BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options = {});
+  ~BatchOf();
+  BatchOf(BatchOf&&) noexcept;
+  BatchOf& operator=(BatchOf&&) noexcept;
+
+  const Model& model() const;
+  const BatchOptions& options() const;
+  std::int64_t size() const;
+  int lanes() const;
+  int threads() const;
+  Instructions instructions() const;
+
+  /// Starts instance i anew, its record cleared: positions [nq], velocities [nv], conventions and errors as Simulation's. Others are not
+  /// touched; several threads may reset different instances at once.
+  void reset(std::int64_t i, std::span<const double> positions, std::span<const double> velocities);
+  /// reset of every instance on all threads; start(i, positions, velocities) fills both, given as the neutral state at rest.
+  void reset_all(const std::function<void(std::int64_t i, std::span<double> positions, std::span<double> velocities)>& start);
+
+  /// Generalized forces on top of gravity, the same over every step until they are changed: rows [nv] to be written at will. The first
+  /// call makes room for them, all zero.
+  BatchView<Real> forces();
+
+  /// Mass m [kg], first moment m c [kg m] and inertia xx xy xz yy yz zz [kg m^2] about the body frame's origin, of one body of one
+  /// instance; the first call gives every instance masses of its own. Keeps positions and momenta, so set it before reset. Throws
+  /// InputError for an inertia that is not positive definite.
+  void set_inertia(std::int64_t i, Index slot, const std::array<double, 10>& inertia);
+  std::array<double, 10> inertia(std::int64_t i, Index slot) const;
+
+  /// n steps of every instance that is not frozen.
+  void step(std::int64_t n = 1);
+
+  BatchView<const Real> positions() const;
+  BatchView<const Real> momenta() const;
+  /// v = M(q)^-1 p and energy (kinetic, potential [J]) of all instances, computed at every call.
+  struct Observation {
+    std::vector<Real> velocity_numbers, energy_numbers;
+    Index nv;
+    int lanes;
+    BatchView<const Real> velocities() const { return {velocity_numbers, nv, lanes}; }
+    BatchView<const Real> energies() const { return {energy_numbers, 2, lanes}; }
+  };
+  Observation observe() const;
+
+  const InstanceRecord& record(std::int64_t i) const;
+  BatchSummary summary() const;
+  /// What froze instance i: one sentence; empty where it runs.
+  std::string describe(std::int64_t i) const;
+
+  /// Bytes of all that is kept of the instances.
+  std::size_t bytes() const;
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+using Batch = BatchOf<double>;
+using FloatBatch = BatchOf<float>;  // half the memory, twice the speed; what it costs: bench/precision.cpp
+
+}  // namespace linden

@@ -1,0 +1,27 @@
+// Compiled once for each set of instructions; CMakeLists.txt says which: LINDEN_INSTRUCTIONS names it, LINDEN_PACK(Real) is its register.
+#include "engine/lane_stepper.hpp"
+
+#include <xsimd/xsimd.hpp>
+
+namespace linden {
+
+template <class Real>
+using PackOf = LINDEN_PACK;
+
+template <class Real>
+std::unique_ptr<BlockStepper<Real>> make_lane_stepper(const BlockSetup<Real>& setup) {
+  using Pack = PackOf<Real>;
+  if (setup.own_masses) return std::make_unique<LaneStepper<Pack, true>>(setup);
+  return std::make_unique<LaneStepper<Pack, false>>(setup);
+}
+
+template <>
+std::unique_ptr<BlockStepper<double>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS>(const BlockSetup<double>& setup) {
+  return make_lane_stepper<double>(setup);
+}
+template <>
+std::unique_ptr<BlockStepper<float>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS>(const BlockSetup<float>& setup) {
+  return make_lane_stepper<float>(setup);
+}
+
+}  // namespace linden

@@ -1,0 +1,109 @@
+// kernels/innovation_up.hpp
+// The upward half of an evaluation and of a solve in one sweep, for a block of instances: lane = instance.
+//
+//   E_i = h mu_i + sum over children c of Ad_{X_c^-1}^T (E_c - gain_up_c u_c),    u_i = S_i^T E_i - h (p + h/2 Q)_i
+//
+// Impulses F of the residual and impulses b of joints that yield (residual_up, impulse_pass_up) travel by the same road, so their
+// difference E = F - b does, at half the cost. Where the residual vanishes E is F; what is left of u is handed on as r is
+// (momentum_update_map): the momentum of the whole tree stays exact.
+//
+//   innovation_up       with the gains there are
+//   newton_up           factors the Jacobian on the way (newton_factor_up): FirstOrder with K to first order, or with the exact K
+//
+// reads   screw 2 x n, inertia 10 x n, placement 12 x n, motion 7 x n, turn 3 x n or displacement 7 x n, momentum_target nv, impulse 6 x n
+//         holding h mu, (gains)
+// writes  impulse 6 x n (E), innovation nv (u), (articulated 36 x n: the children's share of Pi; gains)
+// returns sum of |u.(d^-1 u)|, the squared energy norm of the residual (see impulse_pass_up)
+// source  the paper, Algorithm 2, lines 8 and 9; Featherstone, Rigid Body Dynamics Algorithms, 7.3
+#pragma once
+
+#include "kernels/evaluate_down.hpp"
+#include "kernels/impulse_pass_up.hpp"
+#include "kernels/newton_factor_up.hpp"
+
+namespace linden {
+
+/// E - gain_up u, adding |u.(d^-1 u)| to `norm`.
+template <JointKind Kind, class S>
+LINDEN_INLINE Wrench<S> pass_joint(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& E,
+                                   const Wrench<S>& u, S& norm) {
+  using std::abs;
+  const Index row = tree.first_v(i);
+  const Wrench<S> given = yield(joint, gains.inverse, tree.first_block(i), u);
+  if constexpr (Kind == JointKind::screw) {
+    norm = norm + abs(u.n.x * given.n.x);
+    return E - u.n.x * load<Wrench, S>(gains.up, row);
+  } else if constexpr (Kind == JointKind::ball) {
+    norm = norm + abs(dot(u.n, given.n));
+    return E - (u.n.x * load<Wrench, S>(gains.up, row) + u.n.y * load<Wrench, S>(gains.up, row + 1) +
+                u.n.z * load<Wrench, S>(gains.up, row + 2));
+  } else {
+    norm = norm + abs(dot(u.n, given.n) + dot(u.f, given.f));
+    return E - u;
+  }
+}
+
+template <class S, class Element>
+[[gnu::noinline]] S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  store(work.impulse, 0, Wrench<S>{zero, zero});
+  const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  S norm(0.0);
+  up(tree, [&](auto joint, Index i) {
+    const Index row = tree.first_v(i), parent = tree.parent(i);
+    const auto E = load<Wrench, S>(work.impulse, i);
+    const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
+    store_joint(joint, work.innovation, row, u);
+    const Wrench<S> passed = pass_joint(joint, tree, gains, i, E, u, norm);
+    store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(load<Placement, S>(work.placement, i), passed));
+  });
+  return norm;
+}
+
+template <bool FirstOrder, class S, class Element>
+[[gnu::noinline]] S newton_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  store(work.impulse, 0, Wrench<S>{zero, zero});
+  const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  S norm(0.0);
+  up(tree, [&](auto joint, Index i) {
+    const Index row = tree.first_v(i), parent = tree.parent(i);
+    const auto G = load<Inertia, S>(constants.inertia, i);
+    Mat6<S> A;
+    if constexpr (FirstOrder) {
+      A = pose_derivative_first_order(G, load<Vec3, S>(work.turn, i));
+    } else {
+      const Twist<S> twist = log(load<Displacement, S>(work.displacement, i));
+      A = pose_derivative(G, twist, G * twist);
+    }
+    if (tree.is_leaf(i) == 0) A = A + load<Mat6, S>(work.articulated, i);
+    store(work.articulated, i, A);
+    settle();
+    S felt[36];
+    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt);
+    settle();
+
+    const auto X = load<Placement, S>(work.placement, i);
+    S* const above = work.articulated.row(parent);
+    if constexpr (joint != JointKind::free) {
+      const auto X_pose = after_motion(joint, X, load_motion(joint, work.motion, i));
+      if (tree.is_last_child(i) != 0) {
+        to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = value; });
+      } else {
+        to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = above[at] + value; });
+      }
+    } else if (tree.is_last_child(i) != 0) {
+      for (int k = 0; k < 36; ++k) above[k] = S(0.0);
+    }
+    settle();
+
+    const auto E = load<Wrench, S>(work.impulse, i);
+    const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
+    store_joint(joint, work.innovation, row, u);
+    const Wrench<S> passed = pass_joint(joint, tree, gains, i, E, u, norm);
+    store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(X, passed));
+  });
+  return norm;
+}
+
+}  // namespace linden

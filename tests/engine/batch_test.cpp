@@ -1,0 +1,351 @@
+// A batch is many simulations: the same motion as one by one, the same bits in any company, and no instance pays for another's failure.
+#include "engine/batch.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+
+#include "engine/initial_state.hpp"
+#include "engine/simulation.hpp"
+#include "layout/input_error.hpp"
+#include "layout/urdf.hpp"
+#include "models/generators.hpp"
+
+namespace linden {
+namespace {
+
+using SharedModel = std::shared_ptr<const Model>;
+
+SharedModel shared(Model model) { return std::make_shared<const Model>(std::move(model)); }
+Model own_model(const char* file, Base base) { return load_urdf(std::string(LINDEN_MODELS_DIR) + "/" + file, base); }
+
+std::vector<Instructions> all_instructions() {
+  std::vector<Instructions> list;
+  for (const Instructions one : {Instructions::scalar, Instructions::baseline, Instructions::avx2, Instructions::avx512}) {
+    if (available(one)) list.push_back(one);
+  }
+  return list;
+}
+
+template <class Batch>
+void start(Batch& batch, std::int64_t i, std::uint64_t seed, double spread) {
+  const InitialState state = random_state(batch.model(), seed, spread);
+  batch.reset(i, state.positions, state.velocities);
+}
+
+template <class Batch>
+void start_all(Batch& batch, double spread) {
+  for (std::int64_t i = 0; i < batch.size(); ++i) start(batch, i, static_cast<std::uint64_t>(i) + 1, spread);
+}
+
+/// Everything an instance is, as bytes.
+template <class Batch>
+std::string bytes_of(const Batch& batch, std::int64_t i) {
+  const Eigen::VectorXd q = batch.positions().instance(i).template cast<double>();
+  const Eigen::VectorXd p = batch.momenta().instance(i).template cast<double>();
+  std::string bytes(static_cast<std::size_t>(q.size() + p.size()) * sizeof(double), '\0');
+  std::memcpy(bytes.data(), q.data(), static_cast<std::size_t>(q.size()) * sizeof(double));
+  std::memcpy(bytes.data() + static_cast<std::size_t>(q.size()) * sizeof(double), p.data(), static_cast<std::size_t>(p.size()) * sizeof(double));
+  return bytes;
+}
+
+template <class Batch>
+double difference(const Batch& batch, std::int64_t i, Simulation& simulation) {
+  double worst = 0;
+  for (Index row = 0; row < batch.positions().rows(); ++row) {
+    worst = std::max(worst, std::abs(static_cast<double>(batch.positions()(i, row)) - simulation.positions()[static_cast<std::size_t>(row)]));
+  }
+  return worst;
+}
+
+TEST_CASE("every instance moves as a simulation of its own, with any set of instructions") {
+  // fast ones among slow ones, so that lanes of a block need different numbers of corrections
+  const SharedModel models[] = {shared(chain(10)), shared(random_tree({.bodies = 14, .seed = 3})),
+                                shared(own_model("humanoid.urdf", Base::floating)), shared(own_model("hand.urdf", Base::fixed))};
+  for (const SharedModel& model : models) {
+    for (const Instructions instructions : all_instructions()) {
+      BatchOptions options;
+      options.tolerance = 1e-13;
+      options.instructions = instructions;
+      Batch batch(model, 19, options);
+      const auto spread = [](std::int64_t i) { return i % 5 == 0 ? 2.0 : 0.3; };
+      for (std::int64_t i = 0; i < batch.size(); ++i) start(batch, i, static_cast<std::uint64_t>(i) + 1, spread(i));
+      batch.step(60);
+      double worst = 0;
+      for (std::int64_t i = 0; i < batch.size(); ++i) {
+        Simulation simulation(model, options);
+        const InitialState state = random_state(*model, static_cast<std::uint64_t>(i) + 1, spread(i));
+        simulation.set_positions(state.positions);
+        simulation.set_velocities(state.velocities);
+        for (int k = 0; k < 60; ++k) REQUIRE(simulation.step().ok());
+        worst = std::max(worst, difference(batch, i, simulation));
+        CHECK(batch.record(i).steps == 60);
+      }
+      INFO(model->names.model << ", " << name(instructions) << ": largest difference " << worst);
+      CHECK(batch.lanes() == (instructions == Instructions::scalar ? 1 : 1 << static_cast<int>(instructions)));
+      CHECK(worst < 1e-9);
+    }
+  }
+}
+
+template <class AnyBatch>
+void check_bits() {
+  const SharedModel model = shared(random_tree({.bodies = 10, .seed = 8}));
+  const auto run = [&](std::int64_t size, int threads, std::int64_t first, const std::vector<std::int64_t>& parts) {
+    BatchOptions options;
+    options.threads = threads;
+    AnyBatch batch(model, size, options);
+    // some fast, so that neighbours differ in what they need
+    for (std::int64_t i = 0; i < size; ++i) start(batch, i, static_cast<std::uint64_t>(first + i), (first + i) % 3 == 0 ? 4.0 : 0.2);
+    for (const std::int64_t steps : parts) batch.step(steps);
+    std::vector<std::string> bytes;
+    for (std::int64_t i = 0; i < size; ++i) bytes.push_back(bytes_of(batch, i));
+    return bytes;
+  };
+  const std::vector<std::string> reference = run(41, 1, 0, {60});
+  CHECK(run(41, 2, 0, {60}) == reference);
+  CHECK(run(41, 3, 0, {60}) == reference);
+  CHECK(run(41, 1, 0, {1, 2, 57}) == reference);
+  // other neighbours, other places, alone
+  for (const std::int64_t first : {1, 5, 17, 40}) {
+    const std::int64_t size = 41 - first;
+    const std::vector<std::string> part = run(size, 2, first, {60});
+    for (std::int64_t i = 0; i < size; ++i) CHECK(part[static_cast<std::size_t>(i)] == reference[static_cast<std::size_t>(first + i)]);
+  }
+}
+
+TEST_CASE("results are equal to the bit for any threads, any batch, any place in it and any splitting of the steps") {
+  check_bits<Batch>();
+  check_bits<FloatBatch>();
+}
+
+TEST_CASE("of 10,000 instances with a poisoned one 9,999 end as without it, and it is frozen where it was") {
+  const SharedModel model = shared(chain(3));
+  constexpr std::int64_t kPoisoned = 4321;
+  const auto run = [&](bool poison) {
+    BatchOptions options;
+    options.max_splits = 2;
+    auto batch = std::make_unique<Batch>(model, 10'000, options);
+    batch->reset_all([&](std::int64_t i, std::span<double> q, std::span<double> v) {
+      const InitialState state = random_state(*model, static_cast<std::uint64_t>(i) + 1, 0.5);
+      std::copy(state.positions.begin(), state.positions.end(), q.begin());
+      std::copy(state.velocities.begin(), state.velocities.end(), v.begin());
+    });
+    if (poison) batch->reset(kPoisoned, std::vector{0.1, 0.2, 0.3}, std::vector{1e6, -1e6, 1e6});
+    batch->step(20);
+    return batch;
+  };
+  const auto healthy = run(false), poisoned = run(true);
+  std::int64_t different = 0;
+  for (std::int64_t i = 0; i < healthy->size(); ++i) different += bytes_of(*healthy, i) == bytes_of(*poisoned, i) ? 0 : 1;
+  CHECK(different == 1);
+  CHECK(healthy->summary().frozen == 0);
+  CHECK(poisoned->summary().frozen == 1);
+  CHECK(poisoned->summary().steps == 9'999 * 20);
+  const InstanceRecord& record = poisoned->record(kPoisoned);
+  CHECK(record.status != StepStatus::converged);
+  CHECK(record.steps == 0);
+  CHECK(poisoned->positions()(kPoisoned, 1) == 0.2);
+  CHECK_THAT(poisoned->describe(kPoisoned), Catch::Contains("joint"));
+  CHECK(poisoned->describe(0).empty());
+
+  // and lives again once it is reset, beside others that do not notice
+  poisoned->reset(kPoisoned, std::vector{0.1, 0.2, 0.3}, std::vector{0.0, 0.0, 0.0});
+  const std::string neighbour = bytes_of(*poisoned, kPoisoned + 1);
+  CHECK(neighbour == bytes_of(*healthy, kPoisoned + 1));
+  healthy->step(5);
+  poisoned->step(5);
+  CHECK(poisoned->record(kPoisoned).steps == 5);
+  CHECK(bytes_of(*poisoned, kPoisoned + 1) == bytes_of(*healthy, kPoisoned + 1));
+}
+
+TEST_CASE("an instance that is reset starts a new episode, the same as the first") {
+  const SharedModel model = shared(own_model("arm.urdf", Base::fixed));
+  Batch batch(model, 11);
+  start_all(batch, 0.5);
+  batch.step(30);
+  const std::string once = bytes_of(batch, 6), other = bytes_of(batch, 5);
+  start(batch, 6, 7, 0.5);
+  CHECK(bytes_of(batch, 5) == other);
+  CHECK(batch.record(6).steps == 0);
+  batch.step(30);
+  CHECK(bytes_of(batch, 6) == once);
+  CHECK(batch.record(6).steps == 30);
+  CHECK(batch.record(5).steps == 60);
+}
+
+TEST_CASE("a step that is too large for the lanes is taken alone, split as a simulation would split it") {
+  const SharedModel model = shared(chain(10));
+  BatchOptions options;
+  options.step = 1e-2;
+  options.tolerance = 1e-12;
+  Batch batch(model, 40, options);
+  start_all(batch, 80);
+  batch.step(3);
+  CHECK(batch.summary().rescued > 0);
+  double worst = 0;
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    Simulation simulation(model, options);
+    const InitialState state = random_state(*model, static_cast<std::uint64_t>(i) + 1, 80);
+    simulation.set_positions(state.positions);
+    simulation.set_velocities(state.velocities);
+    std::int64_t steps = 0;
+    while (steps < 3 && simulation.step().ok()) ++steps;
+    CHECK(batch.record(i).steps == steps);
+    worst = std::max(worst, difference(batch, i, simulation));
+  }
+  INFO("largest difference " << worst);
+  CHECK(worst < 1e-6);
+}
+
+TEST_CASE("forces given from outside do the work they do in a simulation") {
+  const SharedModel model = shared(own_model("humanoid.urdf", Base::floating));
+  const Index nv = model->tree.shape.velocities;
+  BatchOptions options;
+  options.tolerance = 1e-13;
+  options.gravity = {0, 0, 0};
+  Batch batch(model, 5, options);
+  start_all(batch, 0.2);
+  const auto force = [&](std::int64_t i, Index row) { return 0.5 * std::sin(static_cast<double>(3 * i + row)); };
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    for (Index row = 0; row < nv; ++row) batch.forces()(i, row) = force(i, row);
+  }
+  batch.step(40);
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    Simulation simulation(model, options);
+    const InitialState state = random_state(*model, static_cast<std::uint64_t>(i) + 1, 0.2);
+    simulation.set_positions(state.positions);
+    simulation.set_velocities(state.velocities);
+    std::vector<double> forces;
+    for (Index row = 0; row < nv; ++row) forces.push_back(force(i, row));
+    simulation.set_forces(forces);
+    for (int k = 0; k < 40; ++k) REQUIRE(simulation.step().ok());
+    CHECK(difference(batch, i, simulation) < 1e-9);
+    simulation.set_forces({});
+  }
+}
+
+TEST_CASE("instances with masses of their own move as models with those masses") {
+  const Model plain = own_model("arm.urdf", Base::fixed);
+  BatchOptions options;
+  options.tolerance = 1e-13;
+  for (const Instructions instructions : all_instructions()) {
+    options.instructions = instructions;
+    Batch batch(plain, 6, options);
+    const auto heavier = [](std::array<double, 10> inertia, std::int64_t i) {
+      for (double& number : inertia) number *= 1 + 0.3 * static_cast<double>(i);
+      return inertia;
+    };
+    for (std::int64_t i = 0; i < batch.size(); ++i) {
+      for (const Index slot : {2, 3}) batch.set_inertia(i, slot, heavier(batch.inertia(i, slot), i));
+      start(batch, i, 4, 0.5);
+    }
+    batch.step(50);
+    for (std::int64_t i = 0; i < batch.size(); ++i) {
+      Model model = plain;
+      for (const Index slot : {2, 3}) {
+        const std::array<double, 10> inertia = batch.inertia(i, slot);
+        for (std::size_t k = 0; k < 10; ++k) model.constants.inertia(slot, static_cast<int>(k)) = inertia[k];
+      }
+      sum_subtree_masses(model.tree, model.constants);
+      Simulation simulation(model, options);
+      const InitialState state = random_state(model, 4, 0.5);
+      simulation.set_positions(state.positions);
+      simulation.set_velocities(state.velocities);
+      for (int k = 0; k < 50; ++k) REQUIRE(simulation.step().ok());
+      CHECK(difference(batch, i, simulation) < 1e-9);
+      const auto seen = batch.observe();
+      CHECK(seen.energies()(i, 0) == Approx(simulation.energy().kinetic).epsilon(1e-9));
+      CHECK(seen.energies()(i, 1) == Approx(simulation.energy().potential).epsilon(1e-9));
+    }
+    CHECK(bytes_of(batch, 0) != bytes_of(batch, 5));
+  }
+}
+
+TEST_CASE("velocities and energies are those of a simulation, mimic joints included") {
+  for (const SharedModel& model : {shared(own_model("humanoid.urdf", Base::floating)), shared(own_model("hand.urdf", Base::fixed))}) {
+    Batch batch(model, 10);
+    start_all(batch, 0.4);
+    const auto seen = batch.observe();
+    for (std::int64_t i = 0; i < batch.size(); ++i) {
+      Simulation simulation(model);
+      const InitialState state = random_state(*model, static_cast<std::uint64_t>(i) + 1, 0.4);
+      simulation.set_positions(state.positions);
+      simulation.set_velocities(state.velocities);
+      const std::vector<double> v = simulation.velocities();
+      for (Index row = 0; row < model->tree.shape.velocities; ++row) {
+        CHECK(seen.velocities()(i, row) == Approx(v[static_cast<std::size_t>(row)]).margin(1e-10));
+      }
+      CHECK(seen.energies()(i, 0) == Approx(simulation.energy().kinetic).epsilon(1e-11));
+      CHECK(seen.energies()(i, 1) == Approx(simulation.energy().potential).epsilon(1e-11).margin(1e-12));
+    }
+  }
+}
+
+TEST_CASE("single precision stays near double precision and keeps energy to its own digits") {
+  const SharedModel model = shared(own_model("humanoid.urdf", Base::floating));
+  Batch fine(model, 20);
+  FloatBatch coarse(model, 20);
+  CHECK(coarse.lanes() == 2 * fine.lanes());
+  start_all(fine, 0.3);
+  start_all(coarse, 0.3);
+  const auto before = coarse.observe();
+  fine.step(200);
+  coarse.step(200);
+  const auto after = coarse.observe();
+  for (std::int64_t i = 0; i < fine.size(); ++i) {
+    const Eigen::VectorXd difference = coarse.positions().instance(i).cast<double>() - fine.positions().instance(i);
+    CHECK(difference.lpNorm<Eigen::Infinity>() < 1e-4);
+    const auto total = [&](const auto& seen) { return static_cast<double>(seen.energies()(i, 0)) + static_cast<double>(seen.energies()(i, 1)); };
+    CHECK(std::abs(total(after) - total(before)) < 1e-4 * static_cast<double>(after.energies()(i, 0)));
+  }
+  CHECK(coarse.summary().frozen == 0);
+}
+
+TEST_CASE("a batch keeps three numbers a degree of freedom and a small record an instance") {
+  const SharedModel model = shared(own_model("humanoid.urdf", Base::floating));
+  const auto dofs = static_cast<std::size_t>(model->tree.shape.velocities);
+  constexpr std::size_t count = 1024, quaternion = 1, pace = 2;
+  CHECK(Batch(model, count).bytes() == count * ((3 * dofs + quaternion + pace) * sizeof(double) + sizeof(InstanceRecord)));
+  CHECK(FloatBatch(model, count).bytes() == count * ((3 * dofs + quaternion + pace) * sizeof(float) + sizeof(InstanceRecord)));
+  CHECK(sizeof(InstanceRecord) <= 40);
+}
+
+TEST_CASE("views lead to where the numbers lie") {
+  Batch batch(chain(4), 21);
+  start_all(batch, 0.5);
+  const BatchView<const double> q = batch.positions();
+  CHECK(q.rows() == 4);
+  CHECK(q.flat().size() % static_cast<std::size_t>(4 * q.lanes()) == 0);
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    const InitialState state = random_state(batch.model(), static_cast<std::uint64_t>(i) + 1, 0.5);
+    CHECK(&q(i, 2) == q.instance(i).data() + 2 * q.lanes());
+    CHECK(q.instance(i) == Eigen::Map<const Eigen::VectorXd>(state.positions.data(), 4));
+  }
+}
+
+TEST_CASE("what makes no sense for a batch is refused with what was found and expected") {
+  const SharedModel model = shared(chain(3));
+  const auto with = [](const auto& change) {
+    BatchOptions options;
+    change(options);
+    return options;
+  };
+  CHECK_THROWS_WITH(Batch(model, 0), Catch::Contains("0 instances"));
+  CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.solver = Solver::riqn; })), Catch::Contains("riqn"));
+  CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.guess = FirstGuess::ig3; })), Catch::Contains("ig3"));
+  CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.stop = StopTest::absolute; })), Catch::Contains("absolute"));
+  CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.threads = -1; })), Catch::Contains("-1 threads"));
+  CHECK_THROWS_AS(Batch(model, 4, with([](auto& o) { o.step = 0; })), InputError);
+  Batch batch(model, 4);
+  const std::vector<double> three(3, 0.0), two(2, 0.0), broken{0, std::nan(""), 0};
+  CHECK_THROWS_WITH(batch.reset(4, three, three), Catch::Contains("no instance 4"));
+  CHECK_THROWS_WITH(batch.reset(0, two, three), Catch::Contains("expected 3"));
+  CHECK_THROWS_WITH(batch.reset(0, three, broken), Catch::Contains("nan"));
+  CHECK_THROWS_WITH(batch.set_inertia(0, 9, {}), Catch::Contains("no body 9"));
+  CHECK_THROWS_WITH(batch.set_inertia(0, 1, {-1, 0, 0, 0, 1, 0, 0, 1, 0, 1}), Catch::Contains("no body's"));
+  CHECK_THROWS_WITH(batch.set_inertia(0, 1, {1, 1, 0, 0, 1, 0, 0, 0.5, 0, 1}), Catch::Contains("no body's"));
+}
+
+}  // namespace
+}  // namespace linden
