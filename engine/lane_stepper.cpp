@@ -4,6 +4,7 @@
 #include <xsimd/xsimd.hpp>
 
 namespace linden {
+namespace {
 
 template <class Real>
 using PackOf = LINDEN_PACK;
@@ -14,6 +15,8 @@ std::unique_ptr<BlockStepper<Real>> make_lane_stepper(const BlockSetup<Real>& se
   if (setup.own_masses) return std::make_unique<LaneStepper<Pack, true>>(setup);
   return std::make_unique<LaneStepper<Pack, false>>(setup);
 }
+
+}  // namespace
 
 template <>
 std::unique_ptr<BlockStepper<double>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS>(const BlockSetup<double>& setup) {

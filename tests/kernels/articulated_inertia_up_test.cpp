@@ -110,7 +110,7 @@ TEST_CASE("M applied by velocities and M^-1 by the factor cancel on chains of 30
     impulse_up(rig.tree, rig.constants, rig.work.placement, rig.work.impulse, rig.work.residual);
     const double error = relative_error(vector(rig.work.residual), vector(rig.right_side));
     INFO(model.names.model << ": relative error of M M^-1 r: " << error);
-    CHECK(error < 1e-9);
+    CHECK(error < 1e-8);  // rounding along 300 joints: 3e-10 to 3e-9, by compiler
   }
 }
 
