@@ -124,9 +124,9 @@ bool agrees(const Model& model) {
   Workspace<double>& work = plain.work;
   const Gains<double> gains{work.gain_up, work.gain_down, work.joint_inverse};
   displacement_down(tree, work.placement, work.motion, work.displacement);
-  momentum_map(tree, model.constants, work.displacement, work.twist, work.body_momentum, work.impulse);
+  momentum_map(tree, model.constants, work.displacement, work.impulse);
   residual_up(tree, model.constants, work.placement, work.momentum_target, work.impulse, work.residual);
-  newton_factor_up(tree, model.constants, work.placement, work.motion, work.twist, work.body_momentum, work.articulated, gains);
+  newton_factor_up(tree, model.constants, work.placement, work.motion, work.displacement, work.articulated, gains);
   impulse_pass_up(tree, model.constants, work.placement, gains, work.residual, work.bias, work.innovation);
   increment_down(tree, model.constants, work.placement, work.motion, gains, work.innovation, work.variation, work.increment);
   double worst = 0, scale = 0;

@@ -76,13 +76,13 @@ struct Rig {
   void motion() { motion_map(model.tree, model.constants, work.delta, work.motion); }
   void displacement() { displacement_down(model.tree, work.placement, work.motion, work.displacement); }
   void momentum() {
-    momentum_map(model.tree, model.constants, work.displacement, work.twist, work.body_momentum, work.impulse);
+    momentum_map(model.tree, model.constants, work.displacement, work.impulse);
   }
   void residual() {
     residual_up(model.tree, model.constants, work.placement, work.momentum_target, work.impulse, work.residual);
   }
   void newton_factor() {
-    newton_factor_up(model.tree, model.constants, work.placement, work.motion, work.twist, work.body_momentum, work.articulated,
+    newton_factor_up(model.tree, model.constants, work.placement, work.motion, work.displacement, work.articulated,
                      gains());
   }
   void inertia_factor() { articulated_inertia_up(model.tree, model.constants, work.placement, work.articulated, gains()); }

@@ -11,6 +11,10 @@ inline constexpr double kSlowProgress = 0.1;
 /// to 0.7 of them (chains of 10 to 10,000 hinges, of 100 ball joints, a tree of 1,023, both solvers).
 inline constexpr double kFloorEpsilons = 4;
 
+/// Where a correction has brought it below this many, the next can gain nothing and is not tried: chains from 5,000 links on are spared
+/// their third evaluation.
+inline constexpr double kBareRounding = 0.7;
+
 /// Above this relative residual no step is accepted as converged, rounding or not.
 inline constexpr double kFloorCeiling = 1e-6;
 inline constexpr double kSingleFloorCeiling = 1e-3;  // in single precision

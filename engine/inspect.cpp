@@ -9,7 +9,6 @@
 #include <span>
 #include <string>
 #include <tuple>
-#include <type_traits>
 #include <vector>
 
 #include "engine/load_model.hpp"
@@ -84,18 +83,6 @@ std::vector<BodyFacts> bodies_of(const Model& model) {
     }
   }
   return bodies;
-}
-
-/// Bytes that the fields of a structure take, without allocating them.
-template <class Structure>
-std::size_t bytes_for(const Shape& shape) {
-  const Structure empty{};
-  std::size_t total = 0;
-  Structure::each(empty, [&](const char*, const auto& field, Rows rows, const char*) {
-    using Kind = std::remove_cvref_t<decltype(field)>;
-    total += static_cast<std::size_t>(shape.rows(rows)) * Kind::components * sizeof(typename Kind::value_type);
-  });
-  return total;
 }
 
 struct MergedLink {

@@ -28,12 +28,14 @@ Roots roots_of(const Model& model) {
   return roots;
 }
 
-/// Refuses what would drive the machine out of memory: asked for too much, Linux ends programs without a word.
+}  // namespace
+
 void check_memory(const std::string& name) {
   constexpr double kBytesPerBody = 2600;  // of building and simulating chain:1000000
   const std::string_view count = std::string_view(name).substr(name.find(':') + 1);
   double bodies = 0;
   std::from_chars(count.data(), count.data() + count.size(), bodies);
+  if (name.starts_with("humanoids:")) bodies *= kHumanoidBodies;
   const double needed = bodies * kBytesPerBody;
   const double present = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
   if (present > 0 && needed > present) {
@@ -41,8 +43,6 @@ void check_memory(const std::string& name) {
                                  memory_text(static_cast<std::size_t>(needed)), memory_text(static_cast<std::size_t>(present))));
   }
 }
-
-}  // namespace
 
 Base base_from(const std::string& text) {
   if (text == "fixed") return Base::fixed;

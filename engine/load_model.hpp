@@ -9,9 +9,12 @@
 
 namespace linden {
 
-/// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N. `base` is for URDF files (fixed where it is not given);
-/// throws InputError where it is given for a generated model, and for whatever cannot be read.
+/// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N. `base` is for URDF files (fixed where it is not
+/// given); throws InputError where it is given for a generated model, and for whatever cannot be read.
 Model load_model(const std::string& name, std::optional<Base> base);
+
+/// Refuses a generated model that would drive the machine out of memory: asked for too much, Linux ends programs without a word.
+void check_memory(const std::string& name);
 
 /// "fixed" or "floating"; throws InputError for anything else.
 Base base_from(const std::string& text);

@@ -20,6 +20,7 @@
 #include "engine/load_model.hpp"
 #include "engine/rollout_command.hpp"
 #include "engine/run_command.hpp"
+#include "engine/scaling_command.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
 #include "layout/words.hpp"
@@ -29,7 +30,8 @@ namespace {
 
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
-  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every;
+  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
+      shape, dofs, steps;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -52,7 +54,6 @@ std::array<double, 3> gravity_from(const std::string& text) {
 void read_model_options(const Texts& texts, std::optional<Base>& base, Options& options) {
   if (!texts.base.empty()) base = base_from(texts.base);
   if (!texts.gravity.empty()) options.gravity = gravity_from(texts.gravity);
-  if (!texts.solver.empty()) options.solver = solver_from(texts.solver);
 }
 
 void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
@@ -70,6 +71,7 @@ void read_motion_options(const Texts& texts, MotionArguments& motion, Options& o
 
 void read_run_options(const Texts& texts, RunArguments& run) {
   read_motion_options(texts, run, run.options);
+  if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
   if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
   if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
   if (!texts.order.empty() && texts.order != "2") throw InputError(fmt::format("--order {}: only order 2 exists", texts.order));
@@ -86,7 +88,29 @@ void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
   if (!texts.instructions.empty()) rollout.options.instructions = instructions_from(texts.instructions);
 }
 
-constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N";
+void read_scaling_options(const Texts& texts, ScalingArguments& scaling) {
+  MotionArguments motion;
+  motion.seed = scaling.seed;
+  motion.spread = scaling.spread;
+  read_motion_options(texts, motion, scaling.options);
+  scaling.seed = *motion.seed;
+  scaling.spread = *motion.spread;
+  if (!texts.shape.empty()) scaling.shape = scaling_shape_from(texts.shape);
+  if (!texts.dofs.empty()) scaling.sizes = scaling_sizes_from(texts.dofs);
+  if (!texts.solver.empty()) scaling.solvers = scaling_solvers_from(texts.solver);
+  if (!texts.steps.empty()) scaling.steps = integer_from("--steps", texts.steps, "how many, such as 100");
+  if (texts.duration.empty()) return;
+  if (scaling.steps) throw InputError("--duration and --steps both say how long: leave one of them out");
+  check(scaling.options);
+  scaling.steps = step_count(motion, scaling.options.step);
+}
+
+void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
+  read_model_options(texts, inspect.base, inspect.options);
+  if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
+}
+
+constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 
 CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   CLI::App* command = program.add_subcommand("run", "Simulate one model.");
@@ -147,6 +171,30 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   return command;
 }
 
+CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling) {
+  CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
+  const auto add = [&](const char* group, const char* name, std::string& text, const char* value, const char* meaning) {
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
+  };
+  add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random or humanoids");
+  add("Models", "--dofs", texts.dofs, "A..B", "least and most degrees of freedom, default 10..100000");
+  add("Models", "--seed", texts.seed, "K", "each starts from random positions and speeds, default 1");
+  add("Models", "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  add("Motion", "--steps", texts.steps, "K", "measured steps of each size, default: at least 5, as many as fit in 0.3 s");
+  add("Motion", "--duration", texts.duration, "S", "or their simulated time [s]");
+  add("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3");
+  add("Motion", "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  add("Method", "--solver", texts.solver, "NAMES", "newton (default), riqn or newton,riqn");
+  add("Output", "--json", scaling.json, "FILE.json", "rows and fits, for scripts");
+  add("Output", "--plot", scaling.plot, "FILE.svg|png", "time per step over degrees of freedom");
+  command->footer(
+      "Each row is a size and a solver. Ctrl-C ends the measurement early and keeps the rows that are done.\n\n"
+      "Examples:\n"
+      "  linden scaling --dofs 10..10000 --solver newton,riqn --plot scaling.png\n"
+      "  linden scaling --shape humanoids --dofs 36..36000 --steps 100 --json scaling.json");
+  return command;
+}
+
 CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
   CLI::App* command = program.add_subcommand("inspect", "Print a model: bodies, coordinates, masses, sweeps of a step.");
   command->add_option("MODEL", inspect.model, kModelHelp)->required()->option_text(" ");
@@ -195,15 +243,18 @@ int run_program(int argc, char** argv) {
   program.footer("Examples:\n"
                  "  linden run chain:100 --duration 5 --plot energy.png\n"
                  "  linden rollout models/humanoid.urdf --base floating --instances 4096 --duration 1\n"
+                 "  linden scaling --dofs 10..10000\n"
                  "  linden inspect models/humanoid.urdf --base floating\n\n"
                  "linden COMMAND --help says more.");
   program.get_formatter()->column_width(30);
   Texts texts;
   RunArguments run_arguments;
   RolloutArguments rollout_arguments;
+  ScalingArguments scaling_arguments;
   InspectArguments inspect_arguments;
   const CLI::App* run = add_run(program, texts, run_arguments);
   const CLI::App* rollout = add_rollout(program, texts, rollout_arguments);
+  const CLI::App* scaling = add_scaling(program, texts, scaling_arguments);
   const CLI::App* inspection = add_inspect(program, texts, inspect_arguments);
   program.allow_extras();
   for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->allow_extras();
@@ -216,7 +267,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
     std::string help = "linden";
-    for (const CLI::App* command : {run, rollout, inspection}) {
+    for (const CLI::App* command : {run, rollout, scaling, inspection}) {
       if (!command->parsed()) continue;
       help = "linden " + command->get_name();
       refuse_leftovers(*command, help);
@@ -234,12 +285,17 @@ int run_program(int argc, char** argv) {
     read_rollout_options(texts, rollout_arguments);
     return rollout_command(rollout_arguments);
   }
+  if (scaling->parsed()) {
+    refuse_leftovers(*scaling, "linden scaling");
+    read_scaling_options(texts, scaling_arguments);
+    return scaling_command(scaling_arguments);
+  }
   if (inspection->parsed()) {
     refuse_leftovers(*inspection, "linden inspect");
-    read_model_options(texts, inspect_arguments.base, inspect_arguments.options);
+    read_inspect_options(texts, inspect_arguments);
     return inspect(inspect_arguments);
   }
-  throw InputError("no command given; choose run, rollout or inspect; linden --help says more");
+  throw InputError("no command given; choose run, rollout, scaling or inspect; linden --help says more");
 }
 
 int complain(std::string_view message, int exit_code) {

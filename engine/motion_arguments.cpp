@@ -23,10 +23,12 @@ std::optional<Randomness> randomness(const MotionArguments& arguments) {
   return Randomness{arguments.seed.value_or(kDefaultSeed), arguments.spread.value_or(kDefaultSpread)};
 }
 
+void check_spread(double spread) {
+  if (!std::isfinite(spread) || spread < 0) throw InputError(fmt::format("--spread {}: expected a finite number, zero or more", spread));
+}
+
 std::int64_t step_count(const MotionArguments& arguments, double step) {
-  if (arguments.spread && !(std::isfinite(*arguments.spread) && *arguments.spread >= 0)) {
-    throw InputError(fmt::format("--spread {}: expected a finite number, zero or more", *arguments.spread));
-  }
+  if (arguments.spread) check_spread(*arguments.spread);
   const double duration = arguments.duration;
   // a duration that misses a whole number of steps by rounding is that whole number
   constexpr double kSlack = 1e-9;

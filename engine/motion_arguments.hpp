@@ -26,6 +26,9 @@ struct Randomness {
 };
 std::optional<Randomness> randomness(const MotionArguments& arguments);
 
+/// Throws InputError for a spread that makes no sense.
+void check_spread(double spread);
+
 /// Steps that the duration is. Throws InputError for a duration or a spread that makes no sense.
 std::int64_t step_count(const MotionArguments& arguments, double step);
 

@@ -21,7 +21,7 @@ std::string clock_text(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::int64_t steps, double step) : steps_(steps), step_(step), begin_(Clock::now()) {
+Progress::Progress(std::int64_t steps, double step, const char* unit) : steps_(steps), step_(step), unit_(unit), begin_(Clock::now()) {
   due_ = ::isatty(STDERR_FILENO) == 1 ? begin_ + kQuietAtFirst : Clock::time_point::max();
 }
 
@@ -31,8 +31,8 @@ void Progress::draw(std::int64_t done, Clock::time_point now) {
   const double elapsed = std::chrono::duration<double>(now - begin_).count();
   const auto filled = static_cast<std::size_t>(share * kBarWidth);
   const std::string eta = done > 0 ? clock_text(elapsed * (1 - share) / share) : "?";
-  fmt::print(stderr, "\r\033[K{:3.0f} % [{:<{}}] {:.4g} of {:.4g} s, {} left", 100 * share, std::string(filled, '#'), kBarWidth,
-             static_cast<double>(done) * step_, static_cast<double>(steps_) * step_, eta);
+  fmt::print(stderr, "\r\033[K{:3.0f} % [{:<{}}] {:.4g} of {:.4g} {}, {} left", 100 * share, std::string(filled, '#'), kBarWidth,
+             static_cast<double>(done) * step_, static_cast<double>(steps_) * step_, unit_, eta);
   std::fflush(stderr);
   shown_ = true;
 }

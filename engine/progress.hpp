@@ -11,8 +11,8 @@ class Progress {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `steps` of `step` seconds each are ahead.
-  Progress(std::int64_t steps, double step);
+  /// `steps` of `step` units each are ahead.
+  Progress(std::int64_t steps, double step, const char* unit = "s");
   ~Progress() { erase(); }
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -28,6 +28,7 @@ class Progress {
 
   std::int64_t steps_;
   double step_;
+  const char* unit_;
   Clock::time_point begin_, due_;
   bool shown_ = false;
 };

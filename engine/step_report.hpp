@@ -25,7 +25,6 @@ struct StepReport {
   int substeps = 1;        // above 1: the step failed whole and was split
   bool at_rounding_floor = false;  // stopped above the tolerance, where rounding lets the residual fall no further
   double residual = 0;      // sqrt(1/2 r.M^-1 r / kinetic energy) at the end, the largest over sub-steps
-  double residual_norm = 0; // |r| [N m s, N s], likewise
   Index slot = 0;           // where it failed: the body that turns too far or the joint with the largest residual; 0 = fine
 
   bool ok() const { return status == StepStatus::converged; }

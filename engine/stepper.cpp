@@ -9,6 +9,7 @@
 #include "kernels/displacement_down.hpp"
 #include "kernels/gravity.hpp"
 #include "kernels/increment_down.hpp"
+#include "kernels/innovation_up.hpp"
 #include "kernels/momentum_map.hpp"
 #include "kernels/momentum_update_map.hpp"
 #include "kernels/motion_map.hpp"
@@ -23,10 +24,16 @@ namespace {
 
 constexpr int kMaxBacktracks = 10;
 
+/// Only a residual within this factor of the tolerance is looked at for bare rounding: the look costs a tenth of a correction.
+constexpr double kNearTolerance = 1e4;
+
 /// Next value of the polynomial through the last 1, ..., 5 values, latest first.
 constexpr double kExtrapolation[kHistory][kHistory] = {
     {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}, {5, -10, 10, -5, 1},
 };
+
+/// Bodies that the sweeps of a part of a step go over before the next part: 64 of some 600 bytes stay in the nearest cache.
+constexpr Index kPart = 64;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -38,6 +45,7 @@ Stepper::Stepper(const Model& model, const Options& options)
       options_(options),
       max_iterations_(options.max_iterations > 0 ? options.max_iterations : options.solver == Solver::newton ? 50 : 1000),
       gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
+      one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
       ties_(model.mimics, model.tree.shape.velocities) {
   check(options);
   work_.allocate(model.tree.shape);
@@ -45,7 +53,10 @@ Stepper::Stepper(const Model& model, const Options& options)
 }
 
 void Stepper::refresh(const State<double>& state) {
-  placement_map(model_.tree, *constants_, state.q, work_.placement);
+  in_parts_down([&](Slots part) {
+    placement_map(model_.tree, *constants_, state.q, part, work_.placement);
+    if (gravity_) gravity_field_down(model_.tree, work_.placement, gravity_vector(), part, work_.field);
+  });
   forces();
 }
 
@@ -57,18 +68,16 @@ void Stepper::apply(std::span<const double> force) {
 }
 
 void Stepper::forces() {
-  if (gravity_) gravity();
+  if (gravity_) {
+    potential_ = gravity_force_up(model_.tree, *constants_, work_.placement, work_.field, work_.first_moment, work_.force);
+  }
   for (std::size_t row = 0; row < applied_.size(); ++row) {
     double& force = work_.force.flat()[row];
     force = gravity_ ? force + applied_[row] : applied_[row];
   }
 }
 
-void Stepper::gravity() {
-  const Vec3<double> g{options_.gravity[0], options_.gravity[1], options_.gravity[2]};
-  gravity_field_down(model_.tree, work_.placement, g, work_.field);
-  potential_ = gravity_force_up(model_.tree, *constants_, work_.placement, work_.field, work_.first_moment, work_.force);
-}
+Vec3<double> Stepper::gravity_vector() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
 
 StepReport Stepper::step(State<double>& state, int& history, double h) {
   StepReport report;
@@ -111,13 +120,31 @@ bool Stepper::halves(State<double>& state, int& history, double h, int depth, St
 
 bool Stepper::Evaluated::usable() const { return least_w > 0 && std::isfinite(plain) && std::isfinite(energy); }
 
-Stepper::Evaluated Stepper::evaluate(StepReport& report) {
+/// action(slots) for parts of the tree, root to leaves: all sweeps of an action over as many bodies as stay in the nearest cache.
+template <class Action>
+void Stepper::in_parts_down(const Action& action) const {
+  const Index slots = model_.tree.shape.slots;
+  for (Index begin = 1; begin < slots; begin += kPart) action(Slots{begin, std::min(begin + kPart, slots)});
+}
+
+template <class Action>
+void Stepper::in_parts_up(const Action& action) const {
+  for (Index end = model_.tree.shape.slots; end > 1; end = std::max<Index>(1, end - kPart)) {
+    action(Slots{std::max<Index>(1, end - kPart), end});
+  }
+}
+
+/// motions(slots) brings work_.motion up to date.
+template <class Motions>
+Stepper::Evaluated Stepper::evaluate(StepReport& report, const Motions& motions) {
   report.evaluations += 1;
-  Evaluated result;
-  result.least_w = displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
-  result.energy = momentum_map(model_.tree, *constants_, work_.displacement, work_.twist, work_.body_momentum, work_.impulse);
-  result.plain = residual_up(model_.tree, *constants_, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
-  fold_mimics(ties_.mimics(), work_.residual);
+  Evaluated result{1, 0, 0};
+  in_parts_down([&](Slots part) {
+    motions(part);
+    const double least = displacement_down(model_.tree, work_.placement, work_.motion, part, work_.displacement);
+    result.least_w = std::min(result.least_w, least);
+    result.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
+  });
   return result;
 }
 
@@ -135,8 +162,7 @@ void Stepper::factor_mass() {
 void Stepper::factor(StepReport& report) {
   report.factorisations += 1;
   if (options_.solver == Solver::riqn) return factor_mass();
-  newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.twist, work_.body_momentum,
-                   work_.articulated, gains());
+  newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains());
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
@@ -146,8 +172,41 @@ void Stepper::factor(StepReport& report) {
       work_.increment);
 }
 
-/// Squared energy norm of h r. Ties between joints make the whole solve necessary for it.
-double Stepper::pass_up() {
+/// Squared energy norm of the residual of an evaluation.
+double Stepper::pass_up(Evaluated& now) {
+  if (one_pass_) return innovation_up(model_.tree, *constants_, work_);
+  now.plain = residual_up(model_.tree, *constants_, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
+  fold_mimics(ties_.mimics(), work_.residual);
+  return pass_residual();
+}
+
+/// The same with a fresh factor.
+double Stepper::factor_and_pass(Evaluated& now, StepReport& report) {
+  if (!one_pass_) {
+    factor(report);
+    return pass_up(now);
+  }
+  report.factorisations += 1;
+  double norm = 0;
+  in_parts_up([&](Slots part) {
+    newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains());
+    norm += innovation_up(model_.tree, *constants_, part, work_);
+  });
+  return norm;
+}
+
+/// The same for an evaluation that was passed up already.
+double Stepper::factor_and_pass_again(Evaluated& now, StepReport& report) {
+  if (!one_pass_) {
+    factor(report);
+    return pass_residual();
+  }
+  momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
+  return factor_and_pass(now, report);
+}
+
+/// Ties between joints make the whole solve necessary for the norm.
+double Stepper::pass_residual() {
   const double norm =
       impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
   if (ties_.empty()) return norm;
@@ -167,8 +226,26 @@ void Stepper::pass_down() {
   if (!ties_.empty()) ties_.complete(work_.increment);
 }
 
-void Stepper::correct(double factor) {
-  correct_motion_map(model_.tree, *constants_, work_.applied, factor, work_.delta, work_.motion);
+/// The evaluation after the correction applied last, times `factor`.
+Stepper::Evaluated Stepper::correct(double factor, StepReport& report) {
+  return evaluate(report, [&](Slots part) {
+    correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
+  });
+}
+
+/// The evaluation after a correction by what the factor makes of the residual.
+Stepper::Evaluated Stepper::solve_and_correct(StepReport& report) {
+  report.iterations += 1;
+  if (!one_pass_) {
+    if (ties_.empty()) pass_down();  // with ties, pass_up has solved already
+    std::swap(work_.increment, work_.applied);
+    return correct(1, report);
+  }
+  return evaluate(report, [&](Slots part) {
+    increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, part, work_.variation,
+                   work_.applied);
+    correct_motion_map(model_.tree, *constants_, work_.applied, 1.0, part, work_.delta, work_.motion);
+  });
 }
 
 bool Stepper::converged(const Evaluated& now, double norm, double h) const {
@@ -194,7 +271,8 @@ Index Stepper::fastest_body() const {
   Index fastest = 1;
   double most = -1;
   for (Index i = 1; i < model_.tree.shape.slots; ++i) {
-    const double energy = dot(load<Wrench, double>(work_.body_momentum, i), load<Twist, double>(work_.twist, i));
+    const auto u = log(load<Displacement, double>(work_.displacement, i));
+    const double energy = dot(load<Inertia, double>(constants_->inertia, i) * u, u);
     if (energy > most) {
       most = energy;
       fastest = i;
@@ -220,12 +298,12 @@ Index Stepper::largest_residual() const {
 
 /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small beside
 /// the motion, or beside what gravity alone would do to it where all is at rest.
-bool Stepper::at_rounding_floor(const Evaluated& now, double norm, double h) const {
+bool Stepper::at_rounding_floor(const Evaluated& now, double norm, double h, double epsilons) const {
   const auto& g = options_.gravity;
   const double fall = 0.5 * constants_->subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
   if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
   const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
-  const double unit = kFloorEpsilons * std::numeric_limits<double>::epsilon();
+  const double unit = epsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;
 }
 
@@ -245,7 +323,7 @@ void Stepper::first_guess(const State<double>& state, int history, double h) {
       // qdd = M^-1 (-C + Q), semi-implicit Euler: delta = h (v + h qdd)
       velocity_of(state.p, delta);
       velocity_down(model_.tree, *constants_, work_.placement, delta, work_.twist);
-      coriolis_down(model_.tree, *constants_, work_.placement, delta, work_.twist, work_.body_momentum, work_.impulse);
+      coriolis_down(model_.tree, *constants_, work_.placement, delta, work_.twist, work_.bias, work_.impulse);
       impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, work_.residual);
       for (Index row = 0; row < n; ++row) work_.residual(row) = work_.force(row) - work_.residual(row);
       apply_mass_inverse(work_.residual, work_.residual);
@@ -293,17 +371,15 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(state, history, h);
   spread_mimics<double>(ties_.mimics(), work_.delta);  // corrections keep ties, so the guess must
-  motion_map(model_.tree, *constants_, work_.delta, work_.motion);
-  Evaluated now = evaluate(report);
+  const auto start = [&](Slots part) { motion_map(model_.tree, *constants_, work_.delta, part, work_.motion); };
+  Evaluated now = evaluate(report, start);
   if (!now.usable()) {
     // no displacement at all is always within the range of log
     for (double& value : work_.delta.flat()) value = 0;
-    motion_map(model_.tree, *constants_, work_.delta, work_.motion);
-    now = evaluate(report);
+    now = evaluate(report, start);
   }
-  factor(report);
+  double norm = factor_and_pass(now, report);
   bool fresh = true;  // the factor belongs to the current displacement
-  double norm = pass_up();
   StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
 
   const auto end = [&](StepStatus status) {
@@ -311,18 +387,16 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     if (status == StepStatus::converged) {
       momentum_energy_ = now.energy;
       report.residual = std::max(report.residual, relative);
-      report.residual_norm = std::max(report.residual_norm, std::sqrt(now.plain) / h);
     } else {
       failed_residual_ = relative;
     }
     if (status == StepStatus::not_converged) report.slot = largest_residual();
     return status;
   };
-  const auto try_correction = [&](double factor) {
-    correct(factor);
-    now = evaluate(report);
+  const auto try_out = [&](const Evaluated& tried) {
+    now = tried;
     if (now.usable()) {
-      const double squared = pass_up();
+      const double squared = pass_up(now);
       if (std::isfinite(squared)) return squared;
     }
     trouble = now.least_w > 0 ? StepStatus::not_finite : StepStatus::past_pi;
@@ -338,25 +412,24 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     if (converged(now, norm, h)) return end(StepStatus::converged);
     if (iteration == max_iterations_) return end(StepStatus::not_converged);
 
-    if (ties_.empty()) pass_down();  // with ties, pass_up has solved already
-    std::swap(work_.increment, work_.applied);
-    report.iterations += 1;
     const double before = norm;
     double taken = 1;
-    norm = try_correction(1);
+    norm = try_out(solve_and_correct(report));
     const bool slow = norm > kSlowProgress * kSlowProgress * before;
-    if (slow && at_rounding_floor(now, norm, h)) {
+    const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.energy;
+    if ((slow && at_rounding_floor(now, norm, h, kFloorEpsilons)) ||
+        (close && !converged(now, norm, h) && at_rounding_floor(now, norm, h, kBareRounding))) {
       report.at_rounding_floor = true;
       return end(StepStatus::converged);
     }
     for (int cut = 0; !(norm < before) && cut < kMaxBacktracks; ++cut) {
       taken /= 2;
-      norm = try_correction(-taken);
+      norm = try_out(correct(-taken, report));
       report.backtracks += 1;
     }
     if (!(norm < before)) {
-      norm = try_correction(-taken);  // back to where this iteration began
-      if (at_rounding_floor(now, norm, h)) {
+      norm = try_out(correct(-taken, report));  // back to where this iteration began
+      if (at_rounding_floor(now, norm, h, kFloorEpsilons)) {
         report.at_rounding_floor = true;
         return end(StepStatus::converged);
       }
@@ -364,8 +437,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     }
     fresh = false;
     if (slow && options_.solver == Solver::newton) {
-      factor(report);
-      norm = pass_up();
+      norm = factor_and_pass_again(now, report);
       fresh = true;
     }
   }
@@ -387,7 +459,8 @@ void Stepper::finish(State<double>& state, int& history, double h) {
   refresh(state);
   state.pace(0, 0) = kinetic_;
   state.pace(0, 1) = 0.5 * (work_at_begin + work(work_.force));
-  momentum_update_map(tree, *constants_, h, work_.displacement, work_.impulse, work_.residual, work_.force, state.p);
+  momentum_update_map(tree, *constants_, h, work_.displacement, work_.impulse,
+                      one_pass_ ? work_.innovation : work_.residual, work_.force, state.p);
   fold_mimics(ties_.mimics(), state.p);
 }
 

@@ -4,9 +4,9 @@
 //   momentum_target     h (p + h/2 Q)
 //   first guess         delta
 //   +-> motion_map      M = exp(S delta)
-//   |   displacement_down, momentum_map, residual_up            DRNEA: h r(delta)
+//   |   displacement_down, momentum_map                         DRNEA, downward half
 //   |   newton_factor_up (once a step) or articulated_inertia_up (riqn)
-//   |   impulse_pass_up                                         energy norm of r: converged?
+//   |   innovation_up (or residual_up, impulse_pass_up)         DRNEA, upward half: h r(delta); its energy norm: converged?
 //   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
 //   advance_map, placement_map, gravity, momentum_update_map
 //
@@ -69,16 +69,25 @@ class Stepper {
   };
 
   void first_guess(const State<double>& state, int history, double h);
-  Evaluated evaluate(StepReport& report);
+  template <class Action>
+  void in_parts_down(const Action& action) const;
+  template <class Action>
+  void in_parts_up(const Action& action) const;
+  template <class Motions>
+  Evaluated evaluate(StepReport& report, const Motions& motions);
   void factor(StepReport& report);
   void factor_mass();
-  double pass_up();
+  double pass_up(Evaluated& now);
+  double pass_residual();
+  double factor_and_pass(Evaluated& now, StepReport& report);
+  double factor_and_pass_again(Evaluated& now, StepReport& report);
   void pass_down();
-  void correct(double factor);
+  Evaluated correct(double factor, StepReport& report);
+  Evaluated solve_and_correct(StepReport& report);
   bool converged(const Evaluated& now, double norm, double h) const;
   bool gains_energy(const State<double>& state, double h);
   double work(const Field<double>& force) const;
-  bool at_rounding_floor(const Evaluated& now, double norm, double h) const;
+  bool at_rounding_floor(const Evaluated& now, double norm, double h, double epsilons) const;
   Index worst_displacement() const;
   Index largest_residual() const;
   Index fastest_body() const;
@@ -87,7 +96,7 @@ class Stepper {
   bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
   void finish(State<double>& state, int& history, double h);
   void forces();
-  void gravity();
+  Vec3<double> gravity_vector() const;
   void apply_mass_inverse(const Field<double>& p, Field<double>& v);
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
 
@@ -96,6 +105,7 @@ class Stepper {
   Options options_;
   int max_iterations_;
   bool gravity_;
+  bool one_pass_;  // residual and first half of a solve in one sweep: no ties, and nobody asks for |r|
   double potential_ = 0;
   double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
   double kinetic_ = 0;          // the same in J

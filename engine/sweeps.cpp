@@ -8,6 +8,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options) {
   const bool gravity = options.gravity != std::array<double, 3>{0, 0, 0};
   const bool newton = options.solver == Solver::newton;
   const bool ties = !model.mimics.empty();
+  const bool one_pass = newton && options.stop == StopTest::energy && !ties;
   const bool quaternions = std::ranges::any_of(model.tree.runs, [](const Run& run) { return run.kind != JointKind::screw; });
   std::vector<Sweep> list;
   const auto add = [&](bool present, const Sweep& sweep) {
@@ -23,20 +24,21 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options) {
     case FirstGuess::ig3:
       add(true, {first, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
       add(true, {first, "impulse_pass_up, rate_down", "placement, gains, p", "delta (velocity)"});
-      add(true, {first, "velocity_down, coriolis_down", "inertia, screw, placement, delta", "twist, body_momentum, impulse"});
+      add(true, {first, "velocity_down, coriolis_down", "inertia, screw, placement, delta", "twist, bias, impulse"});
       add(true, {first, "impulse_up", "screw, placement, impulse", "residual (acceleration's force)"});
       add(true, {first, "impulse_pass_up, rate_down", "placement, gains, residual", "delta"});
       break;
   }
   add(true, {first, "motion_map", "screw, delta", "motion"});
   add(true, {evaluation, "displacement_down", "placement, motion", "displacement"});
-  add(true, {evaluation, "momentum_map", "inertia, displacement", "twist, body_momentum, impulse"});
-  add(true, {evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual"});
+  add(true, {evaluation, "momentum_map", "inertia, displacement", "impulse"});
+  add(!one_pass, {evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual"});
   add(ties, {evaluation, "fold_mimics", "residual", "residual"});
-  add(newton, {once, "newton_factor_up", "inertia, screw, placement, motion, twist, body_momentum", "articulated, gains"});
+  add(newton, {once, "newton_factor_up", "inertia, screw, placement, motion, displacement", "gains"});
   add(!newton, {once, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
   add(ties, {once, "ties: a tree solve for each mimic", "gains", "ties"});
-  add(true, {evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation"});
+  add(!one_pass, {evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation"});
+  add(one_pass, {evaluation, "innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation"});
   add(newton, {correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment"});
   add(!newton, {correction, "rate_down", "screw, placement, gains, innovation", "variation, increment"});
   add(ties, {correction, "ties: completion", "increment, ties", "increment"});
@@ -46,7 +48,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options) {
   add(true, {last, "placement_map", "tree_placement, screw, q", "placement"});
   add(gravity, {last, "gravity_field_down", "placement", "field"});
   add(gravity, {last, "gravity_force_up", "inertia, subtree_mass, screw, placement, field", "first_moment, force"});
-  add(true, {last, "momentum_update_map", "screw, displacement, impulse, residual, force", "p"});
+  add(true, {last, "momentum_update_map", one_pass ? "screw, displacement, impulse, innovation, force" : "screw, displacement, impulse, residual, force", "p"});
   add(ties, {last, "fold_mimics", "p", "p"});
   return list;
 }

@@ -38,7 +38,7 @@ LINDEN_INLINE void advance(Joint<Kind>, Index row, const S& delta, const Displac
 
 template <class S>
 void advance_map(const Tree& tree, const Field<S, 7>& motion, const Field<S>& delta, Field<S>& q) {
-  down(tree, [&](auto joint, Index i) {
+  down(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     advance(joint, tree.first_q(i), delta(tree.first_v(i)), load<Displacement, S>(motion, i), q);
   });
 }

@@ -15,15 +15,15 @@
 
 namespace linden {
 
-template <class S, class Element>
+template <class S, class Element, int Room>
 void articulated_inertia_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
-                            Field<S, 36>& articulated, const Gains<S>& gains) {
+                            Field<S, Room>& articulated, const Gains<S>& gains) {
   for (Index i = 0; i < tree.shape.slots; ++i) {
     const auto G = load<Inertia, S>(constants.inertia, i);
     const Mat3<S> C = hat(G.mc);
-    store(articulated, i, Mat6<S>{G.rotational(), C, transpose(C), diagonal(G.m)});
+    Mat6<S>{G.rotational(), C, transpose(C), diagonal(G.m)}.to(articulated.row(i));
   }
-  up(tree, [&](auto joint, Index i) {
+  up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     S felt[36];
     eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, felt);
     if constexpr (joint != JointKind::free) {

@@ -10,6 +10,7 @@
 //
 // reads   placement 12 x n at q^k, motion 7 x n
 // writes  displacement 7 x n (quaternion x y z w, shift [m]; body frame)
+// slots   [begin, end) in order, begin = 1 first: a caller may take a large tree in parts that stay in cache
 // returns the least w of any body: where it is not positive a body turned by pi or more, which log cannot represent
 // cost    one pass; the bodies of one level are independent
 // source  the paper, (19)
@@ -39,18 +40,26 @@ LINDEN_INLINE Displacement<S> moved(Joint<Kind>, const Displacement<S>& parent, 
 }
 
 template <class S>
-S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field<S, 7>& motion, Field<S, 7>& displacement) {
+S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field<S, 7>& motion, Slots slots, Field<S, 7>& displacement) {
   using std::min;
   const S zero(0.0), one(1.0);
-  store(displacement, 0, Displacement<S>{{{zero, zero, zero}, one}, {zero, zero, zero}});
+  if (slots.begin == 1) store(displacement, 0, Displacement<S>{{{zero, zero, zero}, one}, {zero, zero, zero}});
+  auto D = load<Displacement, S>(displacement, slots.begin - 1);  // of the body before, often the parent
   S least = one;
-  down(tree, [&](auto joint, Index i) {
+  down(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const auto M = load<Displacement, S>(motion, i);
-    const auto D = moved(joint, load<Displacement, S>(displacement, tree.parent(i)), load<Placement, S>(placement, i), M);
+    const Index parent = tree.parent(i);
+    if (parent != i - 1) D = load<Displacement, S>(displacement, parent);
+    D = moved(joint, D, load<Placement, S>(placement, i), M);
     store(displacement, i, D);
     least = min(least, min(D.r.w, M.r.w));
   });
   return least;
+}
+
+template <class S>
+S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field<S, 7>& motion, Field<S, 7>& displacement) {
+  return displacement_down(tree, placement, motion, all_slots(tree), displacement);
 }
 
 }  // namespace linden

@@ -93,7 +93,7 @@ template <class S, class Mask, class Element>
     const Twist<S> xi = to_child(after_motion(joint, X, M), load<Twist, S>(work.variation, tree.parent(i)));
     const Wrench<S> increment = joint_increment(joint, tree, gains, i, load_joint(joint, work.innovation, row), xi);
     store_joint(joint, work.increment, row, increment);
-    store(work.variation, i, add_motion(joint, constants, i, row, work.increment, xi));
+    store(work.variation, i, add_motion(joint, constants, i, increment, xi));
     if constexpr (joint == JointKind::screw) {
       const S delta = work.delta(row) - select(active, increment.n.x, zero);
       work.delta(row) = delta;

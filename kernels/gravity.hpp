@@ -18,29 +18,46 @@
 namespace linden {
 
 template <class S>
-void gravity_field_down(const Tree& tree, const Field<S, 12>& placement, const Vec3<S>& gravity, Field<S, 3>& field) {
-  store(field, 0, gravity);
-  for (Index i = 1; i < tree.shape.slots; ++i) {
-    store(field, i, transpose_times(load<Placement, S>(placement, i).R, load<Vec3, S>(field, tree.parent(i))));
+void gravity_field_down(const Tree& tree, const Field<S, 12>& placement, const Vec3<S>& gravity, Slots slots, Field<S, 3>& field) {
+  if (slots.begin == 1) store(field, 0, gravity);
+  auto g = load<Vec3, S>(field, slots.begin - 1);  // at the body before, often the parent
+  for (Index i = slots.begin; i < slots.end; ++i) {
+    const Index parent = tree.parent(i);
+    if (parent != i - 1) g = load<Vec3, S>(field, parent);
+    g = transpose_times(load<Placement, S>(placement, i).R, g);
+    store(field, i, g);
   }
+}
+
+template <class S>
+void gravity_field_down(const Tree& tree, const Field<S, 12>& placement, const Vec3<S>& gravity, Field<S, 3>& field) {
+  gravity_field_down(tree, placement, gravity, all_slots(tree), field);
 }
 
 template <class S, class Element>
 S gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                    const Field<S, 3>& field, Field<S, 3>& first_moment, Field<S>& force) {
-  store(first_moment, 0, Vec3<S>{S(0.0), S(0.0), S(0.0)});
-  for (Index i = 1; i < tree.shape.slots; ++i) {
-    store(first_moment, i, Vec3<S>{as<S>(constants.inertia(i, 1)), as<S>(constants.inertia(i, 2)), as<S>(constants.inertia(i, 3))});
-  }
-  up(tree, [&](auto joint, Index i) {
-    const auto c = load<Vec3, S>(first_moment, i);
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  for (Index i = 0; i < tree.shape.slots; ++i) store(first_moment, i, zero);  // first what the children add
+  Vec3<S> waiting = zero;  // from a child to the parent that comes next
+  up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+    const Vec3<S> own{as<S>(constants.inertia(i, 1)), as<S>(constants.inertia(i, 2)), as<S>(constants.inertia(i, 3))};
+    const Vec3<S> c = load<Vec3, S>(first_moment, i) + own + waiting;
+    store(first_moment, i, c);
     const auto g = load<Vec3, S>(field, i);
     const S mass = as<S>(constants.subtree_mass(i));
     store_joint(joint, force, tree.first_v(i), project(joint, constants, i, Wrench<S>{cross(c, g), mass * g}));
     const auto X = load<Placement, S>(placement, i);
+    const Vec3<S> passed = X.R * c + mass * X.p;
     const Index parent = tree.parent(i);
-    store(first_moment, parent, load<Vec3, S>(first_moment, parent) + X.R * c + mass * X.p);
+    if (parent == i - 1) {
+      waiting = passed;
+    } else {
+      waiting = zero;
+      store(first_moment, parent, load<Vec3, S>(first_moment, parent) + passed);
+    }
   });
+  store(first_moment, 0, load<Vec3, S>(first_moment, 0) + waiting);
   return -dot(load<Vec3, S>(field, 0), load<Vec3, S>(first_moment, 0));
 }
 

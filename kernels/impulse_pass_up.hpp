@@ -33,31 +33,38 @@ LINDEN_INLINE Wrench<S> yield(Joint<Kind>, const Field<S>& inverse, Index block,
   }
 }
 
+/// b + gain_up u, adding |u.(d^-1 u)| to `norm`.
+template <JointKind Kind, class S>
+LINDEN_INLINE Wrench<S> passed_on(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& b,
+                                  const Wrench<S>& u, S& norm) {
+  using std::abs;
+  const Index row = tree.first_v(i);
+  const Wrench<S> given = yield(joint, gains.inverse, tree.first_block(i), u);
+  if constexpr (Kind == JointKind::screw) {
+    norm = norm + abs(u.n.x * given.n.x);
+    return b + u.n.x * load<Wrench, S>(gains.up, row);
+  } else if constexpr (Kind == JointKind::ball) {
+    norm = norm + abs(dot(u.n, given.n));
+    return b + u.n.x * load<Wrench, S>(gains.up, row) + u.n.y * load<Wrench, S>(gains.up, row + 1) +
+           u.n.z * load<Wrench, S>(gains.up, row + 2);
+  } else {
+    norm = norm + abs(dot(u.n, given.n) + dot(u.f, given.f));
+    return b + u;
+  }
+}
+
 template <class S, class Element>
 S impulse_pass_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
                   const Field<S>& residual, Field<S, 6>& bias, Field<S>& innovation) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   for (Index i = 0; i < tree.shape.slots; ++i) store(bias, i, Wrench<S>{zero, zero});
-  using std::abs;
   S norm(0.0);
-  up(tree, [&](auto joint, Index i) {
+  up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const Index row = tree.first_v(i);
     const auto b = load<Wrench, S>(bias, i);
     const Wrench<S> u = load_joint(joint, residual, row) - project(joint, constants, i, b);
     store_joint(joint, innovation, row, u);
-    const Wrench<S> given = yield(joint, gains.inverse, tree.first_block(i), u);
-    Wrench<S> passed;
-    if constexpr (joint == JointKind::screw) {
-      norm = norm + abs(u.n.x * given.n.x);
-      passed = b + u.n.x * load<Wrench, S>(gains.up, row);
-    } else if constexpr (joint == JointKind::ball) {
-      norm = norm + abs(dot(u.n, given.n));
-      passed = b + u.n.x * load<Wrench, S>(gains.up, row) + u.n.y * load<Wrench, S>(gains.up, row + 1) +
-               u.n.z * load<Wrench, S>(gains.up, row + 2);
-    } else {
-      norm = norm + abs(dot(u.n, given.n) + dot(u.f, given.f));
-      passed = b + u;
-    }
+    const Wrench<S> passed = passed_on(joint, tree, gains, i, b, u, norm);
     const Index parent = tree.parent(i);
     store(bias, parent, load<Wrench, S>(bias, parent) + to_parent(load<Placement, S>(placement, i), passed));
   });

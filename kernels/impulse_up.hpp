@@ -22,7 +22,7 @@ void impulse_up(const Tree& tree, const BodyConstants<Element>& constants, const
                 Field<S>& projected) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   store(impulse, 0, Wrench<S>{zero, zero});
-  up(tree, [&](auto joint, Index i) {
+  up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const auto F = load<Wrench, S>(impulse, i);
     store_joint(joint, projected, tree.first_v(i), project(joint, constants, i, F));
     const Index parent = tree.parent(i);

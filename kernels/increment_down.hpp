@@ -8,6 +8,7 @@
 //
 // reads   screw 2 x n, placement 12 x n, (motion 7 x n,) gains, innovation nv (u)
 // writes  variation 6 x n (eta), increment nv (Delta)
+// slots   [begin, end) in order, begin = 1 first
 // cost    one pass; the bodies of one level are independent
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3, pass 3, for impulses
 #pragma once
@@ -38,32 +39,43 @@ LINDEN_INLINE Wrench<S> joint_increment(Joint<Kind> joint, const Tree& tree, con
 
 template <class S, class PlacementOf, class Element>
 void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Gains<S>& gains,
-                const Field<S>& innovation, Field<S, 6>& variation, Field<S>& increment) {
+                const Field<S>& innovation, Slots slots, Field<S, 6>& variation, Field<S>& increment) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-  store(variation, 0, Twist<S>{zero, zero});
-  down(tree, [&](auto joint, Index i) {
-    const Index row = tree.first_v(i);
-    const Twist<S> xi = to_child(placement_of(joint, i), load<Twist, S>(variation, tree.parent(i)));
-    store_joint(joint, increment, row, joint_increment(joint, tree, gains, i, load_joint(joint, innovation, row), xi));
-    store(variation, i, add_motion(joint, constants, i, row, increment, xi));
+  if (slots.begin == 1) store(variation, 0, Twist<S>{zero, zero});
+  auto eta = load<Twist, S>(variation, slots.begin - 1);  // of the body before, often the parent
+  down(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+    const Index row = tree.first_v(i), parent = tree.parent(i);
+    if (parent != i - 1) eta = load<Twist, S>(variation, parent);
+    const Twist<S> xi = to_child(placement_of(joint, i), eta);
+    const Wrench<S> delta = joint_increment(joint, tree, gains, i, load_joint(joint, innovation, row), xi);
+    store_joint(joint, increment, row, delta);
+    eta = add_motion(joint, constants, i, delta, xi);
+    store(variation, i, eta);
   });
+}
+
+template <class S, class Element>
+void increment_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
+                    const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Slots slots,
+                    Field<S, 6>& variation, Field<S>& increment) {
+  const auto placement_of = [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+    return after_motion(joint, load<Placement, S>(placement, i), load<Displacement, S>(motion, i));
+  };
+  yield_down(tree, constants, placement_of, gains, innovation, slots, variation, increment);
 }
 
 template <class S, class Element>
 void increment_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                     const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Field<S, 6>& variation,
                     Field<S>& increment) {
-  const auto placement_of = [&](auto joint, Index i) {
-    return after_motion(joint, load<Placement, S>(placement, i), load<Displacement, S>(motion, i));
-  };
-  yield_down(tree, constants, placement_of, gains, innovation, variation, increment);
+  increment_down(tree, constants, placement, motion, gains, innovation, all_slots(tree), variation, increment);
 }
 
 template <class S, class Element>
 void rate_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
                const Field<S>& innovation, Field<S, 6>& variation, Field<S>& rate) {
   const auto placement_of = [&](auto, Index i) { return load<Placement, S>(placement, i); };
-  yield_down(tree, constants, placement_of, gains, innovation, variation, rate);
+  yield_down(tree, constants, placement_of, gains, innovation, all_slots(tree), variation, rate);
 }
 
 }  // namespace linden

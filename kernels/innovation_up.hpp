@@ -23,48 +23,70 @@
 
 namespace linden {
 
-/// E - gain_up u, adding |u.(d^-1 u)| to `norm`.
-template <JointKind Kind, class S>
-LINDEN_INLINE Wrench<S> pass_joint(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& E,
-                                   const Wrench<S>& u, S& norm) {
-  using std::abs;
-  const Index row = tree.first_v(i);
-  const Wrench<S> given = yield(joint, gains.inverse, tree.first_block(i), u);
-  if constexpr (Kind == JointKind::screw) {
-    norm = norm + abs(u.n.x * given.n.x);
-    return E - u.n.x * load<Wrench, S>(gains.up, row);
-  } else if constexpr (Kind == JointKind::ball) {
-    norm = norm + abs(dot(u.n, given.n));
-    return E - (u.n.x * load<Wrench, S>(gains.up, row) + u.n.y * load<Wrench, S>(gains.up, row + 1) +
-                u.n.z * load<Wrench, S>(gains.up, row + 2));
-  } else {
-    norm = norm + abs(dot(u.n, given.n) + dot(u.f, given.f));
-    return E - u;
-  }
+/// The world has no momentum of its own.
+template <class S>
+void clear_world(Field<S, 6>& impulse) {
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  store(impulse, 0, Wrench<S>{zero, zero});
 }
 
+/// What travels up, on its way: to a parent that comes next in registers, to others through memory.
+template <class S>
+class Climbing {
+ public:
+  Climbing(Field<S, 6>& impulse, Slots slots) : impulse_(impulse), end_(slots.begin) {
+    const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+    none_ = waiting_ = {zero, zero};
+  }
+  /// The body's own impulse and all that its children passed.
+  LINDEN_INLINE Wrench<S> arrived(Index i) {
+    const Wrench<S> sum = load<Wrench, S>(impulse_, i) + waiting_;
+    store(impulse_, i, sum);
+    return sum;
+  }
+  LINDEN_INLINE void pass(const Tree& tree, Index i, const Wrench<S>& passed) {
+    const Index parent = tree.parent(i);
+    if (parent == i - 1 && i > end_) {
+      waiting_ = passed;
+    } else {
+      waiting_ = none_;
+      store(impulse_, parent, load<Wrench, S>(impulse_, parent) + passed);
+    }
+  }
+
+ private:
+  Field<S, 6>& impulse_;
+  Index end_;
+  Wrench<S> none_, waiting_;
+};
+
+/// slots: all, or parts of a large tree from its end to its beginning.
 template <class S, class Element>
-[[gnu::noinline]] S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
-  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-  store(work.impulse, 0, Wrench<S>{zero, zero});
+[[gnu::noinline]] S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Slots slots, Workspace<S>& work) {
   const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  if (slots.end == tree.shape.slots) clear_world(work.impulse);
+  Climbing<S> climbing(work.impulse, slots);
   S norm(0.0);
-  up(tree, [&](auto joint, Index i) {
-    const Index row = tree.first_v(i), parent = tree.parent(i);
-    const auto E = load<Wrench, S>(work.impulse, i);
+  up(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+    const Index row = tree.first_v(i);
+    const Wrench<S> E = climbing.arrived(i);
     const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
     store_joint(joint, work.innovation, row, u);
-    const Wrench<S> passed = pass_joint(joint, tree, gains, i, E, u, norm);
-    store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(load<Placement, S>(work.placement, i), passed));
+    const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
+    climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, i), passed));
   });
   return norm;
 }
 
+template <class S, class Element>
+S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
+  return innovation_up(tree, constants, all_slots(tree), work);
+}
+
 template <bool FirstOrder, class S, class Element>
 [[gnu::noinline]] S newton_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
-  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-  store(work.impulse, 0, Wrench<S>{zero, zero});
   const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  clear_world(work.impulse);
   S norm(0.0);
   up(tree, [&](auto joint, Index i) {
     const Index row = tree.first_v(i), parent = tree.parent(i);
@@ -76,8 +98,8 @@ template <bool FirstOrder, class S, class Element>
       const Twist<S> twist = log(load<Displacement, S>(work.displacement, i));
       A = pose_derivative(G, twist, G * twist);
     }
-    if (tree.is_leaf(i) == 0) A = A + load<Mat6, S>(work.articulated, i);
-    store(work.articulated, i, A);
+    if (tree.is_leaf(i) == 0) A = A + Mat6<S>::from(work.articulated.row(i));
+    A.to(work.articulated.row(i));
     settle();
     S felt[36];
     eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt);
@@ -100,7 +122,8 @@ template <bool FirstOrder, class S, class Element>
     const auto E = load<Wrench, S>(work.impulse, i);
     const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
     store_joint(joint, work.innovation, row, u);
-    const Wrench<S> passed = pass_joint(joint, tree, gains, i, E, u, norm);
+    const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
+    // through memory: six registers more to hold would cost more than they spare
     store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(X, passed));
   });
   return norm;

@@ -10,6 +10,7 @@
 //   free     (1 0; 0 1)              n, f                  six
 #pragma once
 
+#include <algorithm>
 #include <type_traits>
 
 #include "kernels/spatial.hpp"
@@ -22,7 +23,7 @@ template <JointKind Kind>
 using Joint = std::integral_constant<JointKind, Kind>;
 
 template <class Body>
-void with_joint(JointKind kind, Body&& body) {
+LINDEN_INLINE void with_joint(JointKind kind, Body&& body) {
   switch (kind) {
     case JointKind::screw: return body(Joint<JointKind::screw>{});
     case JointKind::ball: return body(Joint<JointKind::ball>{});
@@ -30,47 +31,80 @@ void with_joint(JointKind kind, Body&& body) {
   }
 }
 
+/// Slots [begin, end) of a tree: all of them, or as many as the nearest cache holds.
+struct Slots {
+  Index begin, end;
+};
+inline Slots all_slots(const Tree& tree) { return {1, tree.shape.slots}; }
+
+/// stretch(joint, slots) for every stretch of one kind, root to leaves.
+template <class Stretch>
+LINDEN_INLINE void stretches(const Tree& tree, Slots slots, Stretch&& stretch) {
+  for (const Run& run : tree.runs) {
+    const Slots part{std::max(run.begin, slots.begin), std::min(run.end, slots.end)};
+    if (part.begin >= part.end) continue;
+    with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
+  }
+}
+
+/// body(joint, i) for slots begin ... end - 1, root to leaves.
+template <class Body>
+LINDEN_INLINE void down(const Tree& tree, Slots slots, Body&& body) {
+  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    for (Index i = part.begin; i < part.end; ++i) body(joint, i);
+  });
+}
+
 /// body(joint, i) for every slot but the world, root to leaves.
 template <class Body>
-void down(const Tree& tree, Body&& body) {
-  for (const Run& run : tree.runs) {
-    with_joint(run.kind, [&](auto joint) {
-      for (Index i = run.begin; i < run.end; ++i) body(joint, i);
+LINDEN_INLINE void down(const Tree& tree, Body&& body) {
+  down(tree, all_slots(tree), body);
+}
+
+/// body(joint, i) for slots end - 1 ... begin, leaves to root.
+template <class Body>
+LINDEN_INLINE void up(const Tree& tree, Slots slots, Body&& body) {
+  for (auto run = tree.runs.rbegin(); run != tree.runs.rend(); ++run) {
+    const Slots part{std::max(run->begin, slots.begin), std::min(run->end, slots.end)};
+    if (part.begin >= part.end) continue;
+    with_joint(run->kind, [&](auto joint) LINDEN_INLINE_LAMBDA {
+      for (Index i = part.end - 1; i >= part.begin; --i) body(joint, i);
     });
   }
 }
 
 /// body(joint, i) for every slot but the world, leaves to root.
 template <class Body>
-void up(const Tree& tree, Body&& body) {
-  for (auto run = tree.runs.rbegin(); run != tree.runs.rend(); ++run) {
-    with_joint(run->kind, [&](auto joint) {
-      for (Index i = run->end - 1; i >= run->begin; --i) body(joint, i);
-    });
-  }
+LINDEN_INLINE void up(const Tree& tree, Body&& body) {
+  up(tree, all_slots(tree), body);
 }
 
 /// r and t of a screw joint.
 template <class S>
 struct Screw {
   S r, t;
+
+  template <class E>
+  LINDEN_INLINE static Screw from(const E* row) {
+    return {as<S>(row[0]), as<S>(row[1])};
+  }
 };
 
 template <class S, class Element>
 LINDEN_INLINE Screw<S> load_screw(const BodyConstants<Element>& constants, Index i) {
-  return {as<S>(constants.screw(i, 0)), as<S>(constants.screw(i, 1))};
+  return load<Screw, S>(constants.screw, i);
 }
 
-/// V + S a, a = rates of the joint from row first_v on.
+/// V + S a; of `a` the first nv numbers count, a screw's one number is in n.x.
 template <JointKind Kind, class S, class Element>
-LINDEN_INLINE Twist<S> add_motion(Joint<Kind>, const BodyConstants<Element>& constants, Index i, Index row, const Field<S>& a, Twist<S> V) {
+LINDEN_INLINE Twist<S> add_motion(Joint<Kind>, const BodyConstants<Element>& constants, Index i, const Wrench<S>& a, Twist<S> V) {
   if constexpr (Kind == JointKind::screw) {
     const Screw<S> screw = load_screw<S>(constants, i);
-    V.w.z = V.w.z + screw.r * a(row);
-    V.v.z = V.v.z + screw.t * a(row);
+    V.w.z = V.w.z + screw.r * a.n.x;
+    V.v.z = V.v.z + screw.t * a.n.x;
   } else {
-    V.w += load3<S>(a, row);
-    if constexpr (Kind == JointKind::free) V.v += load3<S>(a, row + 3);
+    V.w += a.n;
+    if constexpr (Kind == JointKind::free) V.v += a.f;
   }
   return V;
 }

@@ -8,12 +8,14 @@
 // h shrinks.
 //
 // reads   inertia 10 x n, displacement 7 x n
-// writes  twist 6 x n (hV: [rad], [m]), body_momentum 6 x n (G hV), impulse 6 x n (h mu; [kg m^2], [kg m]), all in the body frame
+// writes  impulse 6 x n (h mu; [kg m^2], [kg m]), in the body frame
 // returns h^2 times the kinetic energy of the mean motion, sum of 1/2 (hV).(G hV)
-// cost    three short polynomials a body; bodies are independent
+// slots   [begin, end), in any order
+// cost    three short polynomials a body; a body in every lane
 // source  the paper, Algorithm 2, lines 4 and 7
 #pragma once
 
+#include "kernels/body_lanes.hpp"
 #include "kernels/joints.hpp"
 #include "kernels/se3.hpp"
 
@@ -34,17 +36,21 @@ LINDEN_INLINE BodyMomentum<S> body_momentum_of(const Inertia<S>& G, const Displa
 }
 
 template <class S, class Element>
-S momentum_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& twist,
-               Field<S, 6>& body_momentum, Field<S, 6>& impulse) {
+S momentum_map(const Tree&, const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Slots slots,
+               Field<S, 6>& impulse) {
   S energy(0.0);
-  for (Index i = 1; i < tree.shape.slots; ++i) {
-    const auto body = body_momentum_of(load<Inertia, S>(constants.inertia, i), load<Displacement, S>(displacement, i));
-    store(twist, i, body.u);
-    store(body_momentum, i, body.m);
-    store(impulse, i, body.mu);
-    energy = energy + S(0.5) * dot(body.m, body.u);
-  }
+  for_bodies<S>(slots.begin, slots.end, [&](auto bodies, Index i) {
+    using B = typename decltype(bodies)::Scalar;
+    const auto body = body_momentum_of(gather<Inertia>(bodies, constants.inertia, i), gather<Displacement>(bodies, displacement, i));
+    scatter(bodies, impulse, i, body.mu);
+    energy = energy + summed(bodies, B(0.5) * dot(body.m, body.u));
+  });
   return energy;
+}
+
+template <class S, class Element>
+S momentum_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+  return momentum_map(tree, constants, displacement, all_slots(tree), impulse);
 }
 
 }  // namespace linden

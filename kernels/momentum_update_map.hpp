@@ -17,6 +17,7 @@
 // writes  momentum_target nv; momentum p nv [kg m^2/s, kg m/s]
 #pragma once
 
+#include "kernels/body_lanes.hpp"
 #include "kernels/joints.hpp"
 
 namespace linden {
@@ -32,15 +33,24 @@ template <class S, class Element>
 void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Field<S, 7>& displacement,
                          const Field<S, 6>& impulse, const Field<S>& residual, const Field<S>& force, Field<S>& momentum) {
   const S rate = S(1.0) / h, half = S(0.5) * h;
-  down(tree, [&](auto joint, Index i) {
-    const Index row = tree.first_v(i);
-    const auto D = load<Displacement, S>(displacement, i);
-    const Wrench<S> now = project(joint, constants, i, carried(D, load<Wrench, S>(impulse, i)));
-    const Wrench<S> left = load_joint(joint, residual, row);
+  stretches(tree, all_slots(tree), [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
-      momentum(row) = rate * (now.n.x - left.n.x) + half * force(row);
+      const Index shift = tree.first_v(part.begin) - part.begin;
+      for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
+        using B = typename decltype(bodies)::Scalar;
+        const Wrench<B> F = carried(gather<Displacement>(bodies, displacement, i), gather<Wrench>(bodies, impulse, i));
+        const auto screw = gather<Screw>(bodies, constants.screw, i);
+        const B now = screw.r * F.n.z + screw.t * F.f.z;
+        scatter_row(bodies, momentum, i + shift, as<B>(rate) * (now - gather_row(bodies, residual, i + shift)) +
+                                                as<B>(half) * gather_row(bodies, force, i + shift));
+      });
     } else {
-      store_joint(joint, momentum, row, rate * (now - carried(D, left)) + half * load_joint(joint, force, row));
+      for (Index i = part.begin; i < part.end; ++i) {
+        const Index row = tree.first_v(i);
+        const auto D = load<Displacement, S>(displacement, i);
+        const Wrench<S> now = carried(D, load<Wrench, S>(impulse, i)), left = carried(D, load_joint(joint, residual, row));
+        store_joint(joint, momentum, row, rate * (now - left) + half * load_joint(joint, force, row));
+      }
     }
   });
 }

@@ -11,9 +11,10 @@
 // reads   screw 2 x n, delta nv, increment nv [rad, m]
 // writes  motion 7 x n (quaternion x y z w, shift [m]), delta nv
 // range   turns by less than pi
-// cost    two polynomials a screw; bodies are independent
+// cost    two polynomials a screw; a body in every lane
 #pragma once
 
+#include "kernels/body_lanes.hpp"
 #include "kernels/joints.hpp"
 #include "kernels/se3.hpp"
 
@@ -39,30 +40,56 @@ LINDEN_INLINE Displacement<S> joint_motion(Joint<Kind> joint, const BodyConstant
 }
 
 template <class S, class Element>
-void motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& delta, Field<S, 7>& motion) {
-  down(tree, [&](auto joint, Index i) {
-    store(motion, i, joint_motion(joint, constants, i, tree.first_v(i), delta, S(1.0)));
+void motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& delta, Slots slots, Field<S, 7>& motion) {
+  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    if constexpr (joint == JointKind::screw) {
+      const Index shift = tree.first_v(part.begin) - part.begin;
+      for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
+        scatter(bodies, motion, i, screw_motion(gather<Screw>(bodies, constants.screw, i), gather_row(bodies, delta, i + shift)));
+      });
+    } else {
+      for (Index i = part.begin; i < part.end; ++i) {
+        store(motion, i, joint_motion(joint, constants, i, tree.first_v(i), delta, S(1.0)));
+      }
+    }
   });
 }
 
 template <class S, class Element>
 void correct_motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& increment, const S& factor,
-                        Field<S>& delta, Field<S, 7>& motion) {
-  down(tree, [&](auto joint, Index i) {
-    const Index row = tree.first_v(i);
+                        Slots slots, Field<S>& delta, Field<S, 7>& motion) {
+  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
-      delta(row) = delta(row) - factor * increment(row);
-      store(motion, i, screw_motion(load_screw<S>(constants, i), delta(row)));
+      const Index shift = tree.first_v(part.begin) - part.begin;
+      for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
+        using B = typename decltype(bodies)::Scalar;
+        const B better = gather_row(bodies, delta, i + shift) - as<B>(factor) * gather_row(bodies, increment, i + shift);
+        scatter_row(bodies, delta, i + shift, better);
+        scatter(bodies, motion, i, screw_motion(gather<Screw>(bodies, constants.screw, i), better));
+      });
     } else {
-      const auto M = load<Displacement, S>(motion, i);
-      store(motion, i, M * joint_motion(joint, constants, i, row, increment, -factor));
+      for (Index i = part.begin; i < part.end; ++i) {
+        const auto M = load<Displacement, S>(motion, i);
+        store(motion, i, M * joint_motion(joint, constants, i, tree.first_v(i), increment, -factor));
+      }
     }
   });
 }
 
+template <class S, class Element>
+void motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& delta, Field<S, 7>& motion) {
+  motion_map(tree, constants, delta, all_slots(tree), motion);
+}
+
+template <class S, class Element>
+void correct_motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& increment, const S& factor,
+                        Field<S>& delta, Field<S, 7>& motion) {
+  correct_motion_map(tree, constants, increment, factor, all_slots(tree), delta, motion);
+}
+
 template <class S>
 void displacement_map(const Tree& tree, const Field<S, 7>& motion, Field<S>& delta) {
-  down(tree, [&](auto joint, Index i) {
+  down(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     if constexpr (joint != JointKind::screw) {
       const Twist<S> u = log(load<Displacement, S>(motion, i));
       store_joint(joint, delta, tree.first_v(i), Wrench<S>{u.w, u.v});

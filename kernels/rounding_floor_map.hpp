@@ -17,7 +17,7 @@ S rounding_floor_map(const Tree& tree, const BodyConstants<Element>& constants, 
   using std::sqrt;
   S sum(0.0);
   const auto length = [](const Vec3<S>& a) { return sqrt(dot(a, a)); };
-  down(tree, [&](auto joint, Index i) {
+  down(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const auto F = load<Wrench, S>(impulse, i);
     const Index row = tree.first_v(i), block = tree.first_block(i);
     constexpr Index n = velocity_count(joint);

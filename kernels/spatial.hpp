@@ -181,6 +181,7 @@ struct Wrench {
 
   LINDEN_INLINE friend Wrench operator+(const Wrench& a, const Wrench& b) { return {a.n + b.n, a.f + b.f}; }
   LINDEN_INLINE friend Wrench operator-(const Wrench& a, const Wrench& b) { return {a.n - b.n, a.f - b.f}; }
+  LINDEN_INLINE friend Wrench operator-(const Wrench& a) { return {-a.n, -a.f}; }
   LINDEN_INLINE friend Wrench operator*(const S& s, const Wrench& a) { return {s * a.n, s * a.f}; }
 };
 

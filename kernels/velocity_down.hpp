@@ -22,9 +22,9 @@ void velocity_down(const Tree& tree, const BodyConstants<Element>& constants, co
                    const Field<S>& rate, Field<S, 6>& velocity) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   store(velocity, 0, Twist<S>{zero, zero});
-  down(tree, [&](auto joint, Index i) {
+  down(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const auto carried = to_child(load<Placement, S>(placement, i), load<Twist, S>(velocity, tree.parent(i)));
-    store(velocity, i, add_motion(joint, constants, i, tree.first_v(i), rate, carried));
+    store(velocity, i, add_motion(joint, constants, i, load_joint(joint, rate, tree.first_v(i)), carried));
   });
 }
 
@@ -41,9 +41,9 @@ void coriolis_down(const Tree& tree, const BodyConstants<Element>& constants, co
                    const Field<S>& rate, const Field<S, 6>& velocity, Field<S, 6>& acceleration, Field<S, 6>& impulse) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   store(acceleration, 0, Twist<S>{zero, zero});
-  down(tree, [&](auto joint, Index i) {
+  down(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const auto V = load<Twist, S>(velocity, i);
-    const Twist<S> own = add_motion(joint, constants, i, tree.first_v(i), rate, Twist<S>{zero, zero});
+    const Twist<S> own = add_motion(joint, constants, i, load_joint(joint, rate, tree.first_v(i)), Twist<S>{zero, zero});
     const auto carried = to_child(load<Placement, S>(placement, i), load<Twist, S>(acceleration, tree.parent(i)));
     const Twist<S> a = carried + Twist<S>{cross(V.w, own.w), cross(V.w, own.v) + cross(V.v, own.w)};
     store(acceleration, i, a);

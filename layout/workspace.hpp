@@ -3,19 +3,24 @@
 // workspace however many instances it steps. All impulses are carried times h (see kernels/momentum_map.hpp).
 #pragma once
 
+#include <type_traits>
+
 #include "layout/field.hpp"
 
 namespace linden {
+
+/// Room for a 6 x 6 matrix: four 3 x 3 blocks row by row; one tree's are also held as six rows of eight, one a register.
+template <class Scalar>
+inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
 
 #define LINDEN_WORKSPACE_FIELDS(FIELD)                                                                                 \
   FIELD(Scalar, placement, 12, slots, "X: child -> parent at q; rotation row by row, shift [m]")                       \
   FIELD(Scalar, motion, 7, slots, "exp(S delta): the joint's own displacement; quaternion x y z w, shift [m]")         \
   FIELD(Scalar, displacement, 7, slots, "dT = T(k)^-1 T(k+1); quaternion x y z w, shift [m], body frame")              \
   FIELD(Scalar, twist, 6, slots, "h V = log dT: angular [rad], linear [m], body frame")                                \
-  FIELD(Scalar, body_momentum, 6, slots, "G h V: angular [kg m^2], linear [kg m]")                                     \
   FIELD(Scalar, turn, 3, slots, "angular part of h V [rad]")                                                           \
   FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
-  FIELD(Scalar, articulated, 36, slots, "Pi (exact Newton) or articulated inertia: four 3 x 3 blocks, row by row")     \
+  FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia, or what of Pi waits for a parent")      \
   FIELD(Scalar, gain_up, 6, velocities, "Pi S d^-1, one row a degree of freedom")                                      \
   FIELD(Scalar, gain_down, 6, velocities, "(S^T Pi)^T d^-T, one row a degree of freedom")                              \
   FIELD(Scalar, joint_inverse, 1, blocks, "d^-1, d = S^T Pi S, row by row")                                            \
@@ -47,6 +52,18 @@ template <class Structure>
 std::size_t bytes(const Structure& structure) {
   std::size_t total = 0;
   Structure::each(structure, [&](const char*, const auto& field, Rows, const char*) { total += field.bytes(); });
+  return total;
+}
+
+/// Bytes that the fields of a structure take, without allocating them.
+template <class Structure>
+std::size_t bytes_for(const Shape& shape) {
+  const Structure empty{};
+  std::size_t total = 0;
+  Structure::each(empty, [&](const char*, const auto& field, Rows rows, const char*) {
+    using Kind = std::remove_cvref_t<decltype(field)>;
+    total += static_cast<std::size_t>(shape.rows(rows)) * Kind::components * sizeof(typename Kind::value_type);
+  });
   return total;
 }
 

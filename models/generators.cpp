@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "models/random.hpp"
@@ -60,6 +62,60 @@ LinkInertia random_inertia(Random& random, double mass_decades) {
   const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
   inertia.about_center = turn * moments.asDiagonal() * turn.transpose();
   return inertia;
+}
+
+/// A hinge and the box behind it.
+struct Segment {
+  const char* name;
+  Vector3d axis;
+  double along;  // height of the hinge above the one before [m]; below zero: the limb hangs
+  double mass;   // [kg]
+  Vector3d size;  // of the box [m]
+  double center;  // height of its centre above the hinge [m]
+};
+
+/// Humanoid `number`; its names end in that number.
+void add_humanoid(TreeBuilder& builder, Index number) {
+  const Vector3d x = Vector3d::UnitX(), y = Vector3d::UnitY(), z = Vector3d::UnitZ(), knuckle(0.06, 0.06, 0.06);
+  const Segment waist[] = {{"waist_yaw", z, 0, 1, knuckle, 0}, {"waist_roll", x, 0, 1, knuckle, 0},
+                           {"torso", y, 0, 24, {0.2, 0.3, 0.45}, 0.22}};
+  const Segment neck[] = {{"neck_yaw", z, 0, 0.4, knuckle, 0}, {"neck_roll", x, 0, 0.4, knuckle, 0},
+                          {"head", y, 0, 4.6, {0.18, 0.15, 0.24}, 0.14}};
+  const Segment arm[] = {{"shoulder_pitch", y, 0, 0.4, knuckle, 0},          {"shoulder_roll", x, 0, 0.4, knuckle, 0},
+                         {"upper_arm", z, 0, 1.6, {0.08, 0.08, 0.3}, -0.15}, {"forearm", y, -0.3, 1.2, {0.07, 0.07, 0.25}, -0.12},
+                         {"wrist_roll", x, -0.25, 0.2, knuckle, 0},          {"hand", y, 0, 0.4, {0.03, 0.08, 0.18}, -0.09}};
+  const Segment leg[] = {{"hip_yaw", z, 0, 0.6, knuckle, 0},                  {"hip_roll", x, 0, 0.6, knuckle, 0},
+                         {"thigh", y, 0, 9, {0.14, 0.14, 0.42}, -0.2},        {"shank", y, -0.42, 3.2, {0.1, 0.1, 0.43}, -0.2},
+                         {"ankle_pitch", y, -0.43, 0.2, knuckle, 0},          {"foot", x, 0, 0.9, {0.26, 0.1, 0.06}, -0.03}};
+
+  LinkSpec pelvis;
+  pelvis.name = fmt::format("pelvis{}", number);
+  pelvis.joint = fmt::format("base{}", number);
+  pelvis.type = JointType::free;
+  pelvis.placement = shifted(static_cast<double>(number - 1));
+  pelvis.inertia = box_inertia(6.2, {0.2, 0.28, 0.16}, {0, 0, 0.05});
+  builder.add(pelvis);
+  const auto limb = [&](const char* side, const char* parent, Vector3d at, std::span<const Segment> segments) {
+    std::string before = fmt::format("{}{}", parent, number);
+    for (const Segment& segment : segments) {
+      LinkSpec link;
+      link.name = fmt::format("{}{}{}", side, segment.name, number);
+      link.joint = link.name + "_joint";
+      link.parent = std::exchange(before, link.name);
+      link.placement = Isometry3d(Eigen::Translation3d(at + segment.along * z));
+      link.axis = segment.axis;
+      link.inertia = box_inertia(segment.mass, segment.size, segment.center * z);
+      at.setZero();
+      builder.add(std::move(link));
+    }
+  };
+  limb("", "pelvis", {0, 0, 0.12}, waist);
+  limb("", "torso", {0, 0, 0.48}, neck);
+  for (const double left : {1.0, -1.0}) {
+    const char* side = left > 0 ? "left_" : "right_";
+    limb(side, "torso", {0, 0.2 * left, 0.42}, arm);
+    limb(side, "pelvis", {0, 0.09 * left, 0}, leg);
+  }
 }
 
 }  // namespace
@@ -136,6 +192,12 @@ Model random_tree(const RandomTree& recipe) {
   return builder.build();
 }
 
+Model humanoids(Index count) {
+  TreeBuilder builder(fmt::format("humanoids:{}", count));
+  for (Index i = 1; i <= count; ++i) add_humanoid(builder, i);
+  return builder.build();
+}
+
 bool is_generated(const std::string& name) {
   const std::size_t colon = name.find(':');
   return colon != std::string::npos && name.find('/') == std::string::npos && name.find('.') == std::string::npos;
@@ -156,8 +218,9 @@ Model generate(const std::string& name) {
   if (kind == "ball-chain") return ball_chain(count);
   if (kind == "tree") return balanced_tree(count);
   if (kind == "random") return random_tree({.bodies = count});
-  throw InputError(fmt::format("model \"{}\": \"{}\" cannot be generated; choose chain, ball-chain, paper-chain, tree or random, or "
-                               "give a URDF file",
+  if (kind == "humanoids") return humanoids(count);
+  throw InputError(fmt::format("model \"{}\": \"{}\" cannot be generated; choose chain, ball-chain, paper-chain, tree, random or "
+                               "humanoids, or give a URDF file",
                                name, kind));
 }
 

@@ -1,10 +1,14 @@
 // Pictures appear whole or not at all, say what they show, and keep a spike of a single sample.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "engine/plot.hpp"
+#include "engine/plot_scale.hpp"
 
 namespace linden {
 namespace {
@@ -69,6 +73,32 @@ TEST_CASE("numbers that cannot be drawn break the line and nothing else") {
   CHECK_NOTHROW(plot::draw(folder.file("log.svg"), chart));
   for (double& y : chart.series[0].y) y = 42;
   CHECK_NOTHROW(plot::draw(folder.file("constant.png"), chart));
+}
+
+std::vector<std::string> labels(const plot::Scale& scale) {
+  std::vector<std::string> result;
+  for (const plot::Tick& tick : scale.ticks) {
+    if (!tick.label.empty()) result.push_back(tick.label);
+  }
+  return result;
+}
+
+TEST_CASE("a log axis has a labelled tick every decade, minor ones between, all where their values lie") {
+  const plot::Scale scale = plot::make_scale({"time [s]", true}, 1, 10'000, 0, 0.1);
+  CHECK(labels(scale) == std::vector<std::string>{"1", "10", "100", "1000", "10000"});
+  CHECK(scale.ticks.size() == 4 * 9 + 1);
+  for (int k = 0; k <= 4; ++k) {
+    CHECK(scale(std::pow(10, k)) == Approx(0.25 * k).margin(1e-12));
+    CHECK(scale.ticks[static_cast<std::size_t>(9 * k)].at == Approx(0.25 * k).margin(1e-12));
+  }
+  CHECK(std::ranges::is_sorted(scale.ticks, {}, &plot::Tick::at));
+  CHECK(std::isnan(scale(0)));
+  CHECK(std::isnan(scale(-1)));
+}
+
+TEST_CASE("a log axis of many decades labels only some, and of few more than the decades") {
+  CHECK(labels(plot::make_scale({"", true}, 1e-12, 1, 0, 0.2)).size() == 5);
+  CHECK(labels(plot::make_scale({"", true}, 10, 100, 0, 0.1)) == std::vector<std::string>{"10", "20", "50", "100"});
 }
 
 TEST_CASE("what cannot be drawn is refused with the reason, and no file appears") {

@@ -146,7 +146,7 @@ TEST_CASE("eliminating joints writes every gain, allocates nothing and gives equ
                       to_parent(X, X, felt, [&](int at, const S& value) { A[at] = value; });
                     });
                   },
-                  {"gain_up", "gain_down", "joint_inverse"}, {"articulated"});
+                  {"gain_up", "gain_down", "joint_inverse"}, {}, {"articulated"});
   check_writes(kernel);
   check_allocates_nothing(kernel);
   check_lanes(kernel);

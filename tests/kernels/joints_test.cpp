@@ -53,7 +53,7 @@ TEST_CASE("a joint adds S a to a twist and takes S^T F of a wrench") {
       const VectorXd a = vector(rig.rate).segment(first, body.dofs());
       const Twist<double> V = random_twist(random, 1);
       const Wrench<double> F = random_wrench(random, 1);
-      const Twist<double> sum = add_motion(joint, model.constants, i, first, rig.rate, V);
+      const Twist<double> sum = add_motion(joint, model.constants, i, load_joint(joint, rig.rate, first), V);
       CHECK(relative_error(eigen(sum), eigen(V) + body.S * a) < 4 * kEpsilon);
       const VectorXd projected = VectorXd(eigen(project(joint, model.constants, i, F))).head(body.dofs());
       CHECK(relative_error(projected, body.S.transpose() * eigen(F)) < 4 * kEpsilon);
@@ -91,7 +91,7 @@ TEST_CASE("the two numbers of a screw are its turn and its shift") {
   Field<double> rate;
   rate.allocate(1, 2.0);
   const Joint<JointKind::screw> joint;
-  const Twist<double> V = add_motion(joint, model.constants, 1, 0, rate, Twist<double>{{1, 2, 3}, {4, 5, 6}});
+  const Twist<double> V = add_motion(joint, model.constants, 1, load_joint(joint, rate, 0), Twist<double>{{1, 2, 3}, {4, 5, 6}});
   CHECK((V.w.x == 1 && V.w.y == 2 && V.w.z == 5 && V.v.x == 4 && V.v.y == 5 && V.v.z == 6.5));
   CHECK(project(joint, model.constants, 1, Wrench<double>{{1, 2, 3}, {4, 5, 6}}).n.x == 4.5);
 }
@@ -104,7 +104,7 @@ TEST_CASE("what joints add and take has equal bits in every lane, and nothing al
           using S = std::decay_t<decltype(rig.h)>;
           const Index first = rig.tree.first_v(i);
           const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-          const Twist<S> V = add_motion(joint, rig.constants, i, first, rig.rate, Twist<S>{zero, zero});
+          const Twist<S> V = add_motion(joint, rig.constants, i, load_joint(joint, rig.rate, first), Twist<S>{zero, zero});
           store(rig.work.twist, i, V);
           store_joint(joint, rig.work.residual, first, project(joint, rig.constants, i, Wrench<S>{V.w, V.v}));
         });

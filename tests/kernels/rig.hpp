@@ -17,6 +17,7 @@
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/displacement_down.hpp"
 #include "kernels/increment_down.hpp"
+#include "kernels/innovation_up.hpp"
 #include "kernels/momentum_map.hpp"
 #include "kernels/momentum_update_map.hpp"
 #include "kernels/motion_map.hpp"
@@ -123,7 +124,7 @@ void displace(Rig<S>& rig) {
 template <class S>
 void find_momenta(Rig<S>& rig) {
   displace(rig);
-  momentum_map(rig.tree, rig.constants, rig.work.displacement, rig.work.twist, rig.work.body_momentum,
+  momentum_map(rig.tree, rig.constants, rig.work.displacement,
                rig.work.impulse);
 }
 
@@ -135,11 +136,22 @@ void find_residual(Rig<S>& rig) {
               rig.work.residual);
 }
 
+/// One tree has a factor of its own (lanes = rows of its matrices), a block of instances another; both leave the same gains.
 template <class S>
 void factor_newton(Rig<S>& rig) {
   find_momenta(rig);
-  newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.twist, rig.work.body_momentum,
-                   rig.work.articulated, rig.gains());
+  if constexpr (std::is_same_v<S, double>) {
+    newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.displacement,
+                     rig.work.articulated, rig.gains());
+  } else {
+    Rig<S> block = rig;
+    start_down(block.tree, block.constants, block.work);
+    newton_up<false>(block.tree, block.constants, block.work);
+    rig.work.gain_up = block.work.gain_up;
+    rig.work.gain_down = block.work.gain_down;
+    rig.work.joint_inverse = block.work.joint_inverse;
+  }
+  poison(rig.work.articulated);
 }
 
 template <class S>
@@ -186,12 +198,13 @@ struct Kernel {
   Prepare prepare;
   Run run;
   std::vector<std::string> writes, changes;
+  std::vector<std::string> scratch = {};  // may hold anything afterwards
 };
 
 template <class Prepare, class Run>
 Kernel<Prepare, Run> make_kernel(Prepare prepare, Run run, std::vector<std::string> writes,
-                                 std::vector<std::string> changes = {}) {
-  return {prepare, run, std::move(writes), std::move(changes)};
+                                 std::vector<std::string> changes = {}, std::vector<std::string> scratch = {}) {
+  return {prepare, run, std::move(writes), std::move(changes), std::move(scratch)};
 }
 
 inline bool contains(const std::vector<std::string>& names, std::string_view name) {
@@ -229,6 +242,7 @@ void check_writes(const Kernel<Prepare, Run>& kernel, const std::vector<std::str
         world_untouched = world_untouched && (same || k >= width);
       }
       INFO(model.names.model << ": " << name);
+      if (contains(kernel.scratch, name)) return;
       if (output) {
         CHECK((world || world_untouched));
         CHECK(complete);
@@ -268,6 +282,9 @@ void check_allocates_nothing(const Kernel<Prepare, Run>& kernel) {
 /// eliminated.
 constexpr double kAfterElimination = 1e-10;
 
+/// Scratch that one tree lays out by rows of registers and a block of instances does not.
+constexpr std::string_view kOwnLayout = "articulated";
+
 /// `tolerance`: difference to the plain path, in units of the largest number of a field.
 template <class Prepare, class Run>
 void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {
@@ -285,7 +302,8 @@ void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {
       kernel.prepare(rig);
       kernel.run(rig);
       plain.emplace_back();
-      Rig<double>::each(rig, [&](const char*, auto& field, Rows) {
+      Rig<double>::each(rig, [&](const char* name, auto& field, Rows) {
+        if (name == kOwnLayout) return;
         plain[k].insert(plain[k].end(), field.flat().begin(), field.flat().end());
       });
     }
@@ -302,6 +320,7 @@ void check_lanes(const Kernel<Prepare, Run>& kernel, double tolerance = 1e-12) {
         const bool first = packed[k].empty();
         std::size_t at = 0;
         Rig<Pack>::each(rig, [&](const char* name, auto& field, Rows) {
+          if (name == kOwnLayout) return;
           double scale = 0, worst = 0;
           bool equal = true, both_known = true;
           for (std::size_t n = 0; n < field.flat().size(); ++n) {

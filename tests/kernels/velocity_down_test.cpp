@@ -25,10 +25,10 @@ const auto coriolis = make_kernel(
       velocities.run(rig);
     },
     [](auto& rig) {
-      coriolis_down(rig.tree, rig.constants, rig.work.placement, rig.rate, rig.work.twist, rig.work.body_momentum,
+      coriolis_down(rig.tree, rig.constants, rig.work.placement, rig.rate, rig.work.twist, rig.work.bias,
                     rig.work.impulse);
     },
-    {"body_momentum", "impulse"});
+    {"bias", "impulse"});
 
 TEST_CASE("velocity_down is the Jacobian of every body times the rates") {
   double worst = 0;
@@ -98,7 +98,7 @@ TEST_CASE("accelerations are the derivatives of the bodies' twists when all rate
       const reference::Vector6<Time> V = reference::body_jacobian<Time>(tree, pose, i) * instance.rate.cast<Time>();
       reference::Vector6<double> a;
       for (int k = 0; k < 6; ++k) a[k] = V[k].slope[0];
-      see(worst, (row<Twist>(rig.work.body_momentum, i) - a).norm() / std::max(1.0, a.norm()));
+      see(worst, (row<Twist>(rig.work.bias, i) - a).norm() / std::max(1.0, a.norm()));
     }
   }
   INFO("worst error: " << worst);
@@ -127,7 +127,7 @@ TEST_CASE("a spinning ball joint feels w x I w") {
 TEST_CASE("the velocity sweeps write all they are to write and nothing else") {
   check_writes(velocities, {"twist"});
   check_writes(momenta);
-  check_writes(coriolis, {"body_momentum"});
+  check_writes(coriolis, {"bias"});
 }
 
 TEST_CASE("the velocity sweeps allocate nothing") {

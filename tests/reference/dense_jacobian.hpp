@@ -32,7 +32,7 @@ inline MatrixXd dense_jacobian(const Model& model, const Field<double, 12>& plac
       store(work.motion, i, M * load<Displacement, T>(work.motion, i));
     }
     displacement_down(tree, work.placement, work.motion, work.displacement);
-    momentum_map(tree, model.constants, work.displacement, work.twist, work.body_momentum, work.impulse);
+    momentum_map(tree, model.constants, work.displacement, work.impulse);
     residual_up(tree, model.constants, work.placement, work.momentum_target, work.impulse, work.residual);
     VectorX<T> residual(tree.shape.velocities);
     for (Index row = 0; row < tree.shape.velocities; ++row) residual[row] = work.residual(row);
