@@ -10,7 +10,7 @@
 //   first_q     -      0       7        8       9      10        first row in q
 //
 // Bodies are sorted by level, within a level by joint kind. A *run* is a maximal stretch of one kind: a sweep is a loop over
-// runs, and within a run there is no branch. Runs cross levels (a chain of 10,000 hinges is one run), which is safe for every
+// runs, and within a run there is no branch on the kind. Runs cross levels (a chain of 10,000 hinges is one run), which is safe for every
 // loop that goes slot by slot, since parents precede children; loops over several bodies at once use `level_begin` too.
 //
 // Three joint kinds, three loops. A body's frame sits at its joint, turned so that the joint's axis is z:
