@@ -30,18 +30,23 @@ Roots roots_of(const Model& model) {
 
 }  // namespace
 
+void require_memory(const std::string& what, double bytes) {
+  const double present = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
+  if (present <= 0 || bytes <= present) return;
+  constexpr double kMost = 1e18;
+  throw InputError(fmt::format("{} {} about {} of memory, this machine has {}; choose fewer or a smaller one", what,
+                               what.find(' ') == what.npos ? "needs" : "need",
+                               memory_text(static_cast<std::size_t>(std::min(bytes, kMost))),
+                               memory_text(static_cast<std::size_t>(present))));
+}
+
 void check_memory(const std::string& name) {
   constexpr double kBytesPerBody = 2600;  // of building and simulating chain:1000000
   const std::string_view count = std::string_view(name).substr(name.find(':') + 1);
   double bodies = 0;
   std::from_chars(count.data(), count.data() + count.size(), bodies);
   if (name.starts_with("humanoids:")) bodies *= kHumanoidBodies;
-  const double needed = bodies * kBytesPerBody;
-  const double present = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
-  if (present > 0 && needed > present) {
-    throw InputError(fmt::format("{} needs about {} of memory, this machine has {}; choose a smaller one", name,
-                                 memory_text(static_cast<std::size_t>(needed)), memory_text(static_cast<std::size_t>(present))));
-  }
+  require_memory(name, bodies * kBytesPerBody);
 }
 
 Base base_from(const std::string& text) {

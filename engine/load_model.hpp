@@ -13,7 +13,10 @@ namespace linden {
 /// given); throws InputError where it is given for a generated model, and for whatever cannot be read.
 Model load_model(const std::string& name, std::optional<Base> base);
 
-/// Refuses a generated model that would drive the machine out of memory: asked for too much, Linux ends programs without a word.
+/// Throws InputError where `what` needs more bytes than the machine has: asked for too much, Linux ends programs without a word.
+void require_memory(const std::string& what, double bytes);
+
+/// The same for a generated model.
 void check_memory(const std::string& name);
 
 /// "fixed" or "floating"; throws InputError for anything else.

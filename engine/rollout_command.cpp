@@ -36,6 +36,17 @@ void check_arguments(const RolloutArguments& arguments) {
   }
 }
 
+/// Refuses more instances than this machine's memory holds, with what is computed of all of them at once.
+template <class Real>
+void check_instances(const RolloutArguments& arguments, const Shape& shape) {
+  const double nq = shape.positions, nv = shape.velocities;
+  double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
+  if (!arguments.record.empty()) numbers += nq + nv;
+  const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
+  require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
+                 static_cast<double>(arguments.instances) * each);
+}
+
 /// One rollout from its start to its files.
 template <class Real>
 class Execution {
@@ -77,7 +88,7 @@ class Execution {
       figures_.step_seconds += taken;
       figures_.steps = end;
       if (taken > 0.4) stretch = std::max<std::int64_t>(1, stretch / 2);
-      if (taken < 0.1) stretch *= 2;
+      if (taken < 0.1) stretch = std::min(2 * stretch, figures_.steps_planned);
       if (file_ && figures_.steps % arguments_.every == 0) look();
       progress.update(figures_.steps, now);
     }
@@ -165,6 +176,7 @@ class Execution {
 
 template <class Real>
 int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
+  check_instances<Real>(arguments, model->tree.shape);
   Execution<Real> rollout(arguments, model, steps);
   rollout.steps();
   RolloutFigures& figures = rollout.figures();

@@ -50,6 +50,16 @@ TEST_CASE("equal rollouts write equal files, whatever the threads, and other see
   }
 }
 
+TEST_CASE("a rollout of hundreds of short frames, or of nothing but frozen instances, ends", "[command line]") {
+  const Folder folder;
+  REQUIRE(folder.linden("rollout chain:2 --instances 2 --duration 0.3 --record a.npz --json a.json", "timeout 60").exit_code == 0);
+  CHECK(json_of(folder / "a.json")["steps"] == 300);
+  CHECK(json_of(folder / "a.json")["frames"] == 301);
+  const Outcome frozen = folder.linden("rollout chain:3 --instances 3 --duration 100 --dt 0.5 --spread 500 --json b.json", "timeout 60");
+  CHECK(frozen.exit_code == 1);
+  CHECK(json_of(folder / "b.json")["failures"] == 3);
+}
+
 TEST_CASE("instances that fail are listed and end in exit code 1, with the file of the others", "[command line]") {
   const Folder folder;
   // steps far too long for links that spin this fast
@@ -86,6 +96,7 @@ TEST_CASE("what a rollout cannot be is refused in one line", "[command line]") {
   const Folder folder;
   check_refused(folder, "rollout chain:3 --instances 0", "0 instances");
   check_refused(folder, "rollout chain:3 --instances many", "--instances");
+  check_refused(folder, "rollout chain:1000 --instances 900000000", "900,000,000 instances of chain:1000 need about");
   check_refused(folder, "rollout chain:3 --threads -2", "threads");
   check_refused(folder, "rollout chain:3 --instructions sse9", "choose one of: scalar");
   check_refused(folder, "rollout chain:3 --record a.csv", ".npz or .h5");

@@ -146,6 +146,45 @@ TEST_CASE("a hinge turns by its axis inertia alone however far it turns, a ball 
   CHECK((found * d - Eigen::Matrix3d::Identity()).norm() < 1e-13);
 }
 
+TEST_CASE("a tree gone through in parts is the tree gone through at once") {
+  for (const Model& model : {random_tree({.bodies = 41, .seed = 9}), chain(40), balanced_tree(40)}) {
+    Rig<double> rig(model);
+    rig.set(random_instance(reference::plain_tree(model), 3, 0.1));
+    place(rig);
+    Rig<double> parts = rig;
+    const Tree& tree = model.tree;
+    const auto down = [&](Rig<double>& at, Slots slots) {
+      displacement_down(tree, at.work.placement, at.work.motion, slots, at.work.displacement);
+      momentum_map(tree, at.constants, at.work.displacement, slots, at.work.impulse);
+    };
+    const auto up = [&](Rig<double>& at, Slots slots) {
+      newton_factor_up(tree, at.constants, at.work.placement, at.work.motion, at.work.displacement, slots, at.work.articulated,
+                       at.gains());
+      innovation_up(tree, at.constants, slots, at.work);
+    };
+    const auto solve = [&](Rig<double>& at, Slots slots) {
+      increment_down(tree, at.constants, at.work.placement, at.work.motion, at.gains(), at.work.innovation, slots,
+                     at.work.variation, at.work.increment);
+      correct_motion_map(tree, at.constants, at.work.increment, 1e-3, slots, at.work.delta, at.work.motion);
+    };
+    for (Rig<double>* at : {&rig, &parts}) momentum_target_map(tree, at->h, at->state.p, at->work.force, at->work.momentum_target);
+    down(rig, all_slots(tree));
+    up(rig, all_slots(tree));
+    solve(rig, all_slots(tree));
+    // 11 bodies a part: neither a level nor a register
+    constexpr Index kPart = 11;
+    const Index end = tree.shape.slots;
+    for (Index i = 1; i < end; i += kPart) down(parts, {i, std::min(i + kPart, end)});
+    for (Index i = end; i > 1; i = std::max<Index>(1, i - kPart)) up(parts, {std::max<Index>(1, i - kPart), i});
+    for (Index i = 1; i < end; i += kPart) solve(parts, {i, std::min(i + kPart, end)});
+    INFO(model.names.model);
+    const double scale = vector(rig.work.increment).norm();
+    CHECK((vector(parts.work.innovation) - vector(rig.work.innovation)).norm() <= 1e-12 * vector(rig.work.innovation).norm());
+    CHECK((vector(parts.work.increment) - vector(rig.work.increment)).norm() <= 1e-10 * scale);
+    CHECK(relative_error(vector(parts.work.delta), vector(rig.work.delta)) < 1e-12);
+  }
+}
+
 TEST_CASE("newton_factor_up writes all it is to write and nothing else") {
   check_writes(kernel);
 }
