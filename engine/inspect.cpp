@@ -14,6 +14,7 @@
 #include "engine/load_model.hpp"
 #include "engine/mass_distribution.hpp"
 #include "engine/output_file.hpp"
+#include "engine/report_files.hpp"
 #include "engine/sweeps.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -327,7 +328,7 @@ int inspect(const InspectArguments& arguments) {
   if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
   const Model model = load_model(arguments.model, arguments.base);
   if (!arguments.json.empty()) {
-    write_file(arguments.json, json_of(arguments, model).dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+    write_json(arguments.json, json_of(arguments, model));
   }
   Printer(arguments, model).print();
   return 0;

@@ -51,10 +51,7 @@ void InstanceStepper::set_velocities(std::span<const double> v) {
 
 Energy InstanceStepper::observe() {
   refresh();
-  stepper_.velocity_of(state_.p, rate_);
-  double kinetic = 0;
-  for (Index row = 0; row < state_.p.rows(); ++row) kinetic += 0.5 * state_.p(row) * rate_(row);
-  return {kinetic, stepper_.potential()};
+  return stepper_.energy_of(state_.p, rate_);
 }
 
 void normalise_positions(const Model& model, std::span<double> q) {

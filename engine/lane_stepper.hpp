@@ -74,19 +74,6 @@ struct LanesOf<S> {
   }
 };
 
-/// Results of lanes that are done, while others go on.
-#define LINDEN_KEPT_FIELDS(FIELD)                                                   \
-  FIELD(Scalar, motion, 7, slots, "of the accepted displacement, as in Workspace")  \
-  FIELD(Scalar, displacement, 7, slots, "likewise")                                 \
-  FIELD(Scalar, impulse, 6, slots, "E, likewise")                                   \
-  FIELD(Scalar, innovation, 1, velocities, "u, likewise")                           \
-  FIELD(Scalar, delta, 1, velocities, "likewise")
-
-template <class Scalar>
-struct Kept {
-  LINDEN_FIELDS(LINDEN_KEPT_FIELDS)
-};
-
 template <class Pack, bool kOwnMasses>
 class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
  public:

@@ -112,18 +112,37 @@ void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
 
 constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 
+/// Options of one command, each a text until all have been read.
+struct Adding {
+  CLI::App* command;
+
+  void operator()(const char* group, const char* name, std::string& text, const char* value, const char* meaning) const {
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
+  }
+  void model(std::string& name) const { command->add_option("MODEL", name, kModelHelp)->required()->option_text(" "); }
+  void base(const char* group, Texts& texts) const {
+    (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
+  }
+  void duration(Texts& texts) const { (*this)("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10"); }
+  void step(Texts& texts) const { (*this)("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3"); }
+  void gravity(const char* group, Texts& texts) const {
+    (*this)(group, "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  }
+  void spread(const char* group, Texts& texts) const {
+    (*this)(group, "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  }
+};
+
 CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   CLI::App* command = program.add_subcommand("run", "Simulate one model.");
-  command->add_option("MODEL", run.model, kModelHelp)->required()->option_text(" ");
-  const auto add = [&](const char* group, const char* name, std::string& text, const char* value, const char* meaning) {
-    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
-  };
-  add("Motion", "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
-  add("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10");
-  add("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3");
-  add("Motion", "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  const Adding add{command};
+  add.model(run.model);
+  add.base("Motion", texts);
+  add.duration(texts);
+  add.step(texts);
+  add.gravity("Motion", texts);
   add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
-  add("Start", "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  add.spread("Start", texts);
   add("Start", "--load", run.load, "FILE", "continue from a checkpoint");
   add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
@@ -144,17 +163,15 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
 
 CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout) {
   CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model at once.");
-  command->add_option("MODEL", rollout.model, kModelHelp)->required()->option_text(" ");
-  const auto add = [&](const char* group, const char* name, std::string& text, const char* value, const char* meaning) {
-    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
-  };
+  const Adding add{command};
+  add.model(rollout.model);
   add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
-  add("Instances", "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
-  add("Motion", "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
-  add("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10");
-  add("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3");
-  add("Motion", "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  add.spread("Instances", texts);
+  add.base("Motion", texts);
+  add.duration(texts);
+  add.step(texts);
+  add.gravity("Motion", texts);
   add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10; single precision stops at 3e-6");
   command->add_flag("--float", rollout.single, "single precision: twice as fast, half the memory")->group("Method");
   add("Processor", "--threads", texts.threads, "T", "default: all there are; results do not depend on it");
@@ -173,17 +190,15 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
 
 CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling) {
   CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
-  const auto add = [&](const char* group, const char* name, std::string& text, const char* value, const char* meaning) {
-    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
-  };
+  const Adding add{command};
   add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random or humanoids");
   add("Models", "--dofs", texts.dofs, "A..B", "least and most degrees of freedom, default 10..100000");
   add("Models", "--seed", texts.seed, "K", "each starts from random positions and speeds, default 1");
-  add("Models", "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  add.spread("Models", texts);
   add("Motion", "--steps", texts.steps, "K", "measured steps of each size, default: at least 5, as many as fit in 0.3 s");
   add("Motion", "--duration", texts.duration, "S", "or their simulated time [s]");
-  add("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3");
-  add("Motion", "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  add.step(texts);
+  add.gravity("Motion", texts);
   add("Method", "--solver", texts.solver, "NAMES", "newton (default), riqn or newton,riqn");
   add("Output", "--json", scaling.json, "FILE.json", "rows and fits, for scripts");
   add("Output", "--plot", scaling.plot, "FILE.svg|png", "time per step over degrees of freedom");
@@ -197,15 +212,13 @@ CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling
 
 CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
   CLI::App* command = program.add_subcommand("inspect", "Print a model: bodies, coordinates, masses, sweeps of a step.");
-  command->add_option("MODEL", inspect.model, kModelHelp)->required()->option_text(" ");
-  const auto add = [&](const char* name, std::string& text, const char* value, const char* meaning) {
-    command->add_option(name, text, meaning)->option_text(value)->type_name("value");
-  };
-  add("--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
-  add("--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
-  add("--solver", texts.solver, "NAME", "newton (default) or riqn");
+  const Adding add{command};
+  add.model(inspect.model);
+  add.base("Options", texts);
+  add.gravity("Options", texts);
+  add("Options", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   command->add_flag("--all", inspect.all, "long tables whole, not their first 20 rows");
-  add("--json", inspect.json, "FILE.json", "the same for scripts");
+  add("Options", "--json", inspect.json, "FILE.json", "the same for scripts");
   command->footer("Example:\n  linden inspect models/humanoid.urdf --base floating");
   return command;
 }

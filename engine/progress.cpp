@@ -28,7 +28,7 @@ Progress::Progress(std::int64_t steps, double step, const char* unit) : steps_(s
 void Progress::draw(std::int64_t done, Clock::time_point now) {
   due_ = now + kBetween;
   const double share = static_cast<double>(done) / static_cast<double>(steps_);
-  const double elapsed = std::chrono::duration<double>(now - begin_).count();
+  const double elapsed = seconds(now - begin_);
   const auto filled = static_cast<std::size_t>(share * kBarWidth);
   const std::string eta = done > 0 ? clock_text(elapsed * (1 - share) / share) : "?";
   fmt::print(stderr, "\r\033[K{:3.0f} % [{:<{}}] {:.4g} of {:.4g} {}, {} left", 100 * share, std::string(filled, '#'), kBarWidth,

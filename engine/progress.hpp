@@ -7,6 +7,9 @@
 
 namespace linden {
 
+/// [s]
+inline double seconds(std::chrono::steady_clock::duration time) { return std::chrono::duration<double>(time).count(); }
+
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;

@@ -14,6 +14,7 @@
 #include "engine/load_model.hpp"
 #include "engine/output_file.hpp"
 #include "engine/progress.hpp"
+#include "engine/report_files.hpp"
 #include "engine/rollout_file.hpp"
 #include "engine/rollout_report.hpp"
 #include "engine/text.hpp"
@@ -23,8 +24,6 @@ namespace linden {
 namespace {
 
 using Clock = Progress::Clock;
-
-double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
 
 void check_arguments(const RolloutArguments& arguments) {
   if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
@@ -100,26 +99,14 @@ class Execution {
   /// Complaints go to stderr; true where there were none.
   bool write_files() {
     bool fine = true;
-    const auto write = [&](const auto& action) {
-      try {
-        action();
-      } catch (const std::exception& error) {
-        fmt::print(stderr, "linden: {}\n", printable(error.what()));
-        fine = false;
-      }
-    };
     if (file_) {
-      write([&] {
+      fine = attempt([&] {
         file_->commit();
         figures_.frames = file_->frames();
       });
     }
     if (!arguments_.json.empty()) {
-      write([&] {
-        using Json = nlohmann::ordered_json;
-        write_file(arguments_.json,
-                   rollout_json(arguments_, batch_.model(), figures_).dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
-      });
+      fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
     }
     return fine;
   }

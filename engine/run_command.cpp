@@ -18,6 +18,7 @@
 #include "engine/output_file.hpp"
 #include "engine/progress.hpp"
 #include "engine/recorder.hpp"
+#include "engine/report_files.hpp"
 #include "engine/run_report.hpp"
 #include "engine/text.hpp"
 
@@ -27,8 +28,6 @@ namespace {
 using Clock = Progress::Clock;
 
 constexpr std::int64_t kSamples = 20'000;
-
-double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
 
 /// Whether the file holds something that is no checkpoint: a slip of the hand should not cost anyone a file.
 bool holds_something_else(const std::string& file) {
@@ -108,21 +107,16 @@ class Execution {
     bool fine = true;
     const auto write = [&](const std::string& file, const std::function<void()>& action) {
       if (file.empty()) return;
-      try {
-        action();
+      if (attempt(action)) {
         written_.push_back(file);
-      } catch (const std::exception& error) {
-        fmt::print(stderr, "linden: {}\n", printable(error.what()));
+      } else {
         fine = false;
       }
     };
     write(arguments_.record, [&] { recorder_->commit(); });
     write(arguments_.save, [&] { simulation_.save(arguments_.save); });
     write(arguments_.plot, [&] { plot::draw(arguments_.plot, energy_chart(arguments_, simulation_, figures_)); });
-    write(arguments_.json, [&] {
-      using Json = nlohmann::ordered_json;
-      write_file(arguments_.json, run_json(arguments_, simulation_, figures_).dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
-    });
+    write(arguments_.json, [&] { write_json(arguments_.json, run_json(arguments_, simulation_, figures_)); });
     return fine;
   }
 

@@ -16,6 +16,7 @@
 #include "engine/motion_arguments.hpp"
 #include "engine/output_file.hpp"
 #include "engine/progress.hpp"
+#include "engine/report_files.hpp"
 #include "engine/scaling_report.hpp"
 #include "engine/simulation.hpp"
 #include "engine/text.hpp"
@@ -40,8 +41,6 @@ constexpr std::array<ScalingShape, 6> kShapes{{
 constexpr Index kMostFreedom = 10'000'000;
 constexpr std::int64_t kStretches = 5;
 constexpr double kSeconds = 0.3;  // of the measured steps of a row
-
-double seconds(Clock::duration time) { return std::chrono::duration<double>(time).count(); }
 
 /// Names of the models, small to large.
 std::vector<std::string> models_of(const ScalingShape& shape, const ScalingSizes& sizes) {
@@ -179,22 +178,10 @@ ScalingFigures measure(const ScalingArguments& arguments, const std::vector<std:
 
 /// Complaints go to stderr; true where there were none.
 bool write_files(const ScalingArguments& arguments, const ScalingFigures& figures) {
-  bool fine = true;
-  const auto write = [&](const std::string& file, const auto& action) {
-    if (file.empty()) return;
-    try {
-      action();
-    } catch (const std::exception& error) {
-      fmt::print(stderr, "linden: {}\n", printable(error.what()));
-      fine = false;
-    }
-  };
-  write(arguments.plot, [&] { plot::draw(arguments.plot, scaling_chart(arguments, figures)); });
-  write(arguments.json, [&] {
-    using Json = nlohmann::ordered_json;
-    write_file(arguments.json, scaling_json(arguments, figures).dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
-  });
-  return fine;
+  const bool plotted =
+      arguments.plot.empty() || attempt([&] { plot::draw(arguments.plot, scaling_chart(arguments, figures)); });
+  const bool listed = arguments.json.empty() || attempt([&] { write_json(arguments.json, scaling_json(arguments, figures)); });
+  return plotted && listed;
 }
 
 }  // namespace

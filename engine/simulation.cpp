@@ -76,12 +76,7 @@ StepReport Simulation::step() {
   return report;
 }
 
-Energy Simulation::energy() {
-  stepper_.velocity_of(state_.p, rate_);
-  double kinetic = 0;
-  for (Index row = 0; row < state_.p.rows(); ++row) kinetic += 0.5 * state_.p(row) * rate_(row);
-  return {kinetic, stepper_.potential()};
-}
+Energy Simulation::energy() { return stepper_.energy_of(state_.p, rate_); }
 
 Momentum Simulation::momentum() {
   stepper_.velocity_of(state_.p, rate_);

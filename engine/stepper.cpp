@@ -475,6 +475,13 @@ void Stepper::velocity_of(const Field<double>& p, Field<double>& v) {
   apply_mass_inverse(p, v);
 }
 
+Energy Stepper::energy_of(const Field<double>& p, Field<double>& rate) {
+  velocity_of(p, rate);
+  double kinetic = 0;
+  for (Index row = 0; row < p.rows(); ++row) kinetic += 0.5 * p(row) * rate(row);
+  return {kinetic, potential_};
+}
+
 void Stepper::momentum_of(const Field<double>& v, Field<double>& p) {
   velocity_down(model_.tree, *constants_, work_.placement, v, work_.twist);
   momentum_of_map(model_.tree, *constants_, work_.twist, work_.impulse);

@@ -56,7 +56,8 @@ class Stepper {
   void momentum_of(const Field<double>& v, Field<double>& p);
   /// Momentum of the whole system about the world's origin, in the world's frame, for rates v.
   Wrench<double> total_momentum(const Field<double>& v);
-  double potential() const { return potential_; }
+  /// Of a state with the positions of the last refresh or step; rate = M^-1 p on the way.
+  Energy energy_of(const Field<double>& p, Field<double>& rate);
 
   const Workspace<double>& workspace() const { return work_; }
 

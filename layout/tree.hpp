@@ -11,7 +11,7 @@
 //
 // Bodies are sorted by level, within a level by joint kind. A *run* is a maximal stretch of one kind: a sweep is a loop over
 // runs, and within a run there is no branch on the kind. Runs cross levels (a chain of 10,000 hinges is one run), which is safe for every
-// loop that goes slot by slot, since parents precede children; loops over several bodies at once use `level_begin` too.
+// loop that goes slot by slot, since parents precede children.
 //
 // Three joint kinds, three loops. A body's frame sits at its joint, turned so that the joint's axis is z:
 //   screw  1 DOF  turn by r q about z and shift by t q along z: revolute (r=1, t=0), prismatic (0, 1), helical (1, pitch)

@@ -17,7 +17,7 @@ inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
   FIELD(Scalar, placement, 12, slots, "X: child -> parent at q; rotation row by row, shift [m]")                       \
   FIELD(Scalar, motion, 7, slots, "exp(S delta): the joint's own displacement; quaternion x y z w, shift [m]")         \
   FIELD(Scalar, displacement, 7, slots, "dT = T(k)^-1 T(k+1); quaternion x y z w, shift [m], body frame")              \
-  FIELD(Scalar, twist, 6, slots, "h V = log dT: angular [rad], linear [m], body frame")                                \
+  FIELD(Scalar, twist, 6, slots, "V: velocity of the body [rad/s, m/s], body frame")                                \
   FIELD(Scalar, turn, 3, slots, "angular part of h V [rad]")                                                           \
   FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
   FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia, or what of Pi waits for a parent")      \
@@ -39,6 +39,19 @@ inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
 template <class Scalar>
 struct Workspace {
   LINDEN_FIELDS(LINDEN_WORKSPACE_FIELDS)
+};
+
+#define LINDEN_KEPT_FIELDS(FIELD)                                                  \
+  FIELD(Scalar, motion, 7, slots, "of the accepted displacement, as in Workspace") \
+  FIELD(Scalar, displacement, 7, slots, "likewise")                                \
+  FIELD(Scalar, impulse, 6, slots, "likewise")                                     \
+  FIELD(Scalar, innovation, 1, velocities, "likewise")                             \
+  FIELD(Scalar, delta, 1, velocities, "likewise")
+
+/// Of a block of instances: results of those that are done, while others go on.
+template <class Scalar>
+struct Kept {
+  LINDEN_FIELDS(LINDEN_KEPT_FIELDS)
 };
 
 /// Fills every field of a structure with NaN.

@@ -68,39 +68,39 @@ std::string joint_xml(const std::string& name, const std::string& parent, const 
 }  // namespace
 
 TEST_CASE("a run prints what it simulated and exits with 0", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("run chain:10 --duration 0.1");
+  const Shell shell;
+  const Outcome outcome = shell.linden("run chain:10 --duration 0.1");
   CHECK(outcome.exit_code == 0);
   CHECK(outcome.err.empty());
   CHECK_THAT(outcome.out, Contains("chain:10") && Contains("10 bodies") && Contains("10 degrees of freedom") && Contains("1 kg"));
   CHECK_THAT(outcome.out, Contains("100 steps") && Contains("newton") && Contains("J/s") && Contains("times real time"));
-  CHECK(folder.files().empty());
+  CHECK(shell.files().empty());
 }
 
 TEST_CASE("a recording has a column for every coordinate and a row for every step", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("run chain:3 --duration 0.05 --record a.csv").exit_code == 0);
-  const Csv chain = csv_of(folder / "a.csv");
+  const Shell shell;
+  REQUIRE(shell.linden("run chain:3 --duration 0.05 --record a.csv").exit_code == 0);
+  const Csv chain = csv_of(shell / "a.csv");
   CHECK(chain.columns == std::vector<std::string>{"time", "energy", "joint1", "joint2", "joint3"});
   REQUIRE(chain.rows.size() == 51);
   CHECK(chain.rows[0][0] == 0);
   CHECK(chain.rows[50][0] == 50 * 1e-3);
   CHECK(std::ranges::all_of(chain.rows, [](const auto& row) { return row.size() == 5; }));
 
-  REQUIRE(folder.linden("run '" + kHumanoid + "' --base floating --duration 0.002 --record b.csv").exit_code == 0);
-  const Csv humanoid = csv_of(folder / "b.csv");
+  REQUIRE(shell.linden("run '" + kHumanoid + "' --base floating --duration 0.002 --record b.csv").exit_code == 0);
+  const Csv humanoid = csv_of(shell / "b.csv");
   const std::vector<std::string> begins(humanoid.columns.begin(), humanoid.columns.begin() + 9);
   CHECK(begins == std::vector<std::string>{"time", "energy", "base.x", "base.y", "base.z", "base.qx", "base.qy", "base.qz", "base.qw"});
   CHECK(humanoid.columns.size() == 2 + static_cast<std::size_t>(load_urdf(kHumanoid, Base::floating).tree.shape.positions));
   CHECK(humanoid.rows.size() == 3);
   CHECK(humanoid.rows[0][8] == 1);
-  CHECK(folder.files() == std::set<std::string>{"a.csv", "b.csv"});
+  CHECK(shell.files() == std::set<std::string>{"a.csv", "b.csv"});
 }
 
 TEST_CASE("the numbers of a recording are those of the library, bit by bit", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("run ball-chain:4 --duration 0.02 --dt 2e-3 --gravity 1,-2.5,3 --record a.csv").exit_code == 0);
-  const Csv csv = csv_of(folder / "a.csv");
+  const Shell shell;
+  REQUIRE(shell.linden("run ball-chain:4 --duration 0.02 --dt 2e-3 --gravity 1,-2.5,3 --record a.csv").exit_code == 0);
+  const Csv csv = csv_of(shell / "a.csv");
   Simulation simulation(ball_chain(4), {.step = 2e-3, .gravity = {1, -2.5, 3}});
   REQUIRE(csv.rows.size() == 11);
   for (const std::vector<double>& row : csv.rows) {
@@ -112,27 +112,27 @@ TEST_CASE("the numbers of a recording are those of the library, bit by bit", "[c
 }
 
 TEST_CASE("equal runs record equal bytes, other seeds others", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   const std::string run = "run '" + kHumanoid + "' --base floating --duration 0.05 --spread 0.3 ";
-  REQUIRE(folder.linden(run + "--seed 7 --record a.csv").exit_code == 0);
-  REQUIRE(folder.linden(run + "--seed 7 --record b.csv").exit_code == 0);
-  REQUIRE(folder.linden(run + "--seed 8 --record c.csv").exit_code == 0);
-  CHECK(text_of(folder / "a.csv") == text_of(folder / "b.csv"));
-  CHECK(text_of(folder / "a.csv") != text_of(folder / "c.csv"));
+  REQUIRE(shell.linden(run + "--seed 7 --record a.csv").exit_code == 0);
+  REQUIRE(shell.linden(run + "--seed 7 --record b.csv").exit_code == 0);
+  REQUIRE(shell.linden(run + "--seed 8 --record c.csv").exit_code == 0);
+  CHECK(text_of(shell / "a.csv") == text_of(shell / "b.csv"));
+  CHECK(text_of(shell / "a.csv") != text_of(shell / "c.csv"));
 }
 
 TEST_CASE("recording and plotting do not change the motion", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("run chain:3 --duration 21 --save a.checkpoint").exit_code == 0);
-  REQUIRE(folder.linden("run chain:3 --duration 21 --save b.checkpoint --record b.csv --plot b.svg").exit_code == 0);
-  CHECK(text_of(folder / "a.checkpoint") == text_of(folder / "b.checkpoint"));
-  CHECK_THAT(text_of(folder / "b.svg"), Contains("<svg") && Contains("chain:3"));
+  const Shell shell;
+  REQUIRE(shell.linden("run chain:3 --duration 21 --save a.checkpoint").exit_code == 0);
+  REQUIRE(shell.linden("run chain:3 --duration 21 --save b.checkpoint --record b.csv --plot b.svg").exit_code == 0);
+  CHECK(text_of(shell / "a.checkpoint") == text_of(shell / "b.checkpoint"));
+  CHECK_THAT(text_of(shell / "b.svg"), Contains("<svg") && Contains("chain:3"));
 }
 
 TEST_CASE("a random start keeps to limits and mimic joints", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("run '" + kHand + "' --duration 0.001 --seed 3 --spread 1.5 --record a.csv").exit_code == 0);
-  const Csv csv = csv_of(folder / "a.csv");
+  const Shell shell;
+  REQUIRE(shell.linden("run '" + kHand + "' --duration 0.001 --seed 3 --spread 1.5 --record a.csv").exit_code == 0);
+  const Csv csv = csv_of(shell / "a.csv");
   const Model model = load_urdf(kHand);
   const std::span<const double> q = std::span(csv.rows.at(0)).subspan(2);
   REQUIRE_FALSE(model.mimics.empty());
@@ -154,9 +154,9 @@ TEST_CASE("a random start keeps to limits and mimic joints", "[command line]") {
 }
 
 TEST_CASE("the figures of a run can be read by scripts", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("run chain:5 --duration 0.5 --spread 0.2 --json a.json --record a.csv").exit_code == 0);
-  const nlohmann::json figures = json_of(folder / "a.json");
+  const Shell shell;
+  REQUIRE(shell.linden("run chain:5 --duration 0.5 --spread 0.2 --json a.json --record a.csv").exit_code == 0);
+  const nlohmann::json figures = json_of(shell / "a.json");
   for (const char* key : {"steps", "wall_seconds", "ns_per_body_step", "iterations_mean", "iterations_max", "energy_initial",
                           "energy_band", "energy_slope", "failures", "bodies", "dofs"}) {
     INFO(key);
@@ -173,7 +173,7 @@ TEST_CASE("the figures of a run can be read by scripts", "[command line]") {
         Approx(1e9 * figures.at("wall_seconds").get<double>() / (500 * 5)));
 
   // energy: against the recording
-  const Csv csv = csv_of(folder / "a.csv");
+  const Csv csv = csv_of(shell / "a.csv");
   double lowest = csv.rows[0][1], highest = lowest, mean_t = 0, mean_h = 0, tt = 0, th = 0;
   const auto n = static_cast<double>(csv.rows.size());
   for (const auto& row : csv.rows) {
@@ -194,184 +194,184 @@ TEST_CASE("the figures of a run can be read by scripts", "[command line]") {
 }
 
 TEST_CASE("momentum is accounted for where nothing outside takes any", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   const std::string run = "run '" + kHumanoid + "' --base floating --duration 0.5 --spread 0.5 --json a.json ";
-  const Outcome isolated = folder.linden(run + "--gravity 0,0,0");
+  const Outcome isolated = shell.linden(run + "--gravity 0,0,0");
   CHECK_THAT(isolated.out, Contains("\nmomentum"));
-  CHECK(json_of(folder / "a.json").at("momentum_drift") < 1e-10);
-  const Outcome falling = folder.linden(run);
+  CHECK(json_of(shell / "a.json").at("momentum_drift") < 1e-10);
+  const Outcome falling = shell.linden(run);
   CHECK_THAT(falling.out, Contains("P - m g t"));
-  CHECK(json_of(folder / "a.json").at("momentum_drift").is_null());
-  CHECK(json_of(folder / "a.json").at("momentum_drift_linear") < 1e-10);
-  CHECK(json_of(folder / "a.json").at("momentum_drift_angular") < 1e-10);
-  CHECK_THAT(folder.linden("run '" + kHumanoid + "' --duration 0.5 --spread 0.5").out, !Contains("\nmomentum"));
+  CHECK(json_of(shell / "a.json").at("momentum_drift").is_null());
+  CHECK(json_of(shell / "a.json").at("momentum_drift_linear") < 1e-10);
+  CHECK(json_of(shell / "a.json").at("momentum_drift_angular") < 1e-10);
+  CHECK_THAT(shell.linden("run '" + kHumanoid + "' --duration 0.5 --spread 0.5").out, !Contains("\nmomentum"));
 }
 
 TEST_CASE("long runs sample their energy", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("run chain:1 --duration 45 --json a.json").exit_code == 0);
-  const nlohmann::json figures = json_of(folder / "a.json");
+  const Shell shell;
+  REQUIRE(shell.linden("run chain:1 --duration 45 --json a.json").exit_code == 0);
+  const nlohmann::json figures = json_of(shell / "a.json");
   CHECK(figures.at("steps") == 45000);
   CHECK(figures.at("energy_sampled_every") == 3);
   CHECK(figures.at("energy_samples") == 15001);
 }
 
 TEST_CASE("a run continued from a checkpoint is the same run", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   const std::string run = "run '" + kHand + "' --base floating --dt 2e-3 ";
-  REQUIRE(folder.linden(run + "--duration 0.4 --spread 0.4 --record whole.csv --save whole.checkpoint").exit_code == 0);
-  REQUIRE(folder.linden(run + "--duration 0.2 --spread 0.4 --record first.csv --save half.checkpoint").exit_code == 0);
-  REQUIRE(folder.linden(run + "--duration 0.2 --load half.checkpoint --record second.csv --save end.checkpoint").exit_code == 0);
-  const Csv whole = csv_of(folder / "whole.csv"), first = csv_of(folder / "first.csv"), second = csv_of(folder / "second.csv");
+  REQUIRE(shell.linden(run + "--duration 0.4 --spread 0.4 --record whole.csv --save whole.checkpoint").exit_code == 0);
+  REQUIRE(shell.linden(run + "--duration 0.2 --spread 0.4 --record first.csv --save half.checkpoint").exit_code == 0);
+  REQUIRE(shell.linden(run + "--duration 0.2 --load half.checkpoint --record second.csv --save end.checkpoint").exit_code == 0);
+  const Csv whole = csv_of(shell / "whole.csv"), first = csv_of(shell / "first.csv"), second = csv_of(shell / "second.csv");
   REQUIRE(whole.rows.size() == 201);
   REQUIRE(first.rows.size() == 101);
   REQUIRE(second.rows.size() == 101);
   CHECK(std::ranges::equal(std::span(whole.rows).first(101), first.rows));
   CHECK(std::ranges::equal(std::span(whole.rows).subspan(100), second.rows));
-  CHECK(text_of(folder / "whole.checkpoint") == text_of(folder / "end.checkpoint"));
+  CHECK(text_of(shell / "whole.checkpoint") == text_of(shell / "end.checkpoint"));
 
-  check_refused(folder, "run chain:3 --load half.checkpoint", "another model");
-  check_refused(folder, run + "--gravity 0,0,0 --load half.checkpoint", "gravity");
-  check_refused(folder, run + "--load half.checkpoint --seed 3", "--load continues a run");
-  check_refused(folder, run + "--load whole.csv", "no checkpoint");
-  check_refused(folder, run + "--load nothing", "does the file exist");
-  check_refused(folder, "run chain:3 --save whole.csv", "is no checkpoint");
+  check_refused(shell, "run chain:3 --load half.checkpoint", "another model");
+  check_refused(shell, run + "--gravity 0,0,0 --load half.checkpoint", "gravity");
+  check_refused(shell, run + "--load half.checkpoint --seed 3", "--load continues a run");
+  check_refused(shell, run + "--load whole.csv", "no checkpoint");
+  check_refused(shell, run + "--load nothing", "does the file exist");
+  check_refused(shell, "run chain:3 --save whole.csv", "is no checkpoint");
 }
 
 TEST_CASE("a step that fails ends the run with 1, names a body and keeps what is good", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("run chain:10 --dt 10 --duration 100 --spread 1000 --record a.csv --json a.json --plot a.png");
+  const Shell shell;
+  const Outcome outcome = shell.linden("run chain:10 --dt 10 --duration 100 --spread 1000 --record a.csv --json a.json --plot a.png");
   CHECK(outcome.exit_code == 1);
   CHECK_THAT(outcome.err, StartsWith("linden: the run failed in step 1 of 10: ") && Contains("body \"link") && Contains("try a step"));
   CHECK_THAT(outcome.err, Contains("last good state is that at 0 s") && Contains("a.csv") && Contains("valid up to there"));
-  const Csv csv = csv_of(folder / "a.csv");
+  const Csv csv = csv_of(shell / "a.csv");
   CHECK(csv.whole);
   CHECK(csv.rows.size() == 1);
-  const nlohmann::json figures = json_of(folder / "a.json");
+  const nlohmann::json figures = json_of(shell / "a.json");
   CHECK(figures.at("failures") == 1);
   CHECK(figures.at("steps") == 0);
   CHECK_THAT(figures.at("failure").get<std::string>(), Contains("link"));
-  CHECK(folder.files() == std::set<std::string>{"a.csv", "a.json", "a.png"});
+  CHECK(shell.files() == std::set<std::string>{"a.csv", "a.json", "a.png"});
 }
 
 TEST_CASE("an interrupted run keeps what is good", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("run chain:5 --duration 1e6 --record a.csv --json a.json --save a.checkpoint",
+  const Shell shell;
+  const Outcome outcome = shell.linden("run chain:5 --duration 1e6 --record a.csv --json a.json --save a.checkpoint",
                                         "timeout --preserve-status --signal=INT 2");
   CHECK(outcome.exit_code == 130);
   CHECK_THAT(outcome.err, StartsWith("linden: interrupted at ") && Contains("valid up to there"));
-  const Csv csv = csv_of(folder / "a.csv");
+  const Csv csv = csv_of(shell / "a.csv");
   CHECK(csv.whole);
-  const nlohmann::json figures = json_of(folder / "a.json");
+  const nlohmann::json figures = json_of(shell / "a.json");
   CHECK(figures.at("interrupted") == true);
   CHECK(figures.at("steps") == csv.rows.size() - 1);
-  CHECK(folder.files() == std::set<std::string>{"a.checkpoint", "a.csv", "a.json"});
-  CHECK(folder.linden("run chain:5 --duration 0.1 --load a.checkpoint").exit_code == 0);
+  CHECK(shell.files() == std::set<std::string>{"a.checkpoint", "a.csv", "a.json"});
+  CHECK(shell.linden("run chain:5 --duration 0.1 --load a.checkpoint").exit_code == 0);
 }
 
 TEST_CASE("models that cannot be simulated are refused with the place of the mistake", "[command line]") {
-  const Folder folder;
-  folder.write("text.urdf", "this is no robot\n");
-  folder.write("loop.urdf", robot_xml(link_xml("a") + link_xml("b") + link_xml("c") + joint_xml("j", "b", "c") + joint_xml("k", "c", "b")));
-  folder.write("roots.urdf", robot_xml(link_xml("a") + link_xml("b") + link_xml("c") + joint_xml("j", "a", "b")));
-  folder.write("mass.urdf", robot_xml(link_xml("a") + link_xml("b", "-2") + joint_xml("j", "a", "b")));
-  folder.write("nan.urdf", robot_xml(link_xml("a") + link_xml("b", "nan") + joint_xml("j", "a", "b")));
+  const Shell shell;
+  shell.write("text.urdf", "this is no robot\n");
+  shell.write("loop.urdf", robot_xml(link_xml("a") + link_xml("b") + link_xml("c") + joint_xml("j", "b", "c") + joint_xml("k", "c", "b")));
+  shell.write("roots.urdf", robot_xml(link_xml("a") + link_xml("b") + link_xml("c") + joint_xml("j", "a", "b")));
+  shell.write("mass.urdf", robot_xml(link_xml("a") + link_xml("b", "-2") + joint_xml("j", "a", "b")));
+  shell.write("nan.urdf", robot_xml(link_xml("a") + link_xml("b", "nan") + joint_xml("j", "a", "b")));
   for (const char* command : {"run ", "inspect "}) {
     const std::string to(command);
-    check_refused(folder, to + "missing.urdf", "missing.urdf: there is no such file");
-    check_refused(folder, to + "text.urdf", "text.urdf:1");
-    check_refused(folder, to + "loop.urdf", "loop");
-    check_refused(folder, to + "roots.urdf", "two root links");
-    check_refused(folder, to + "mass.urdf", "-2");
-    check_refused(folder, to + "nan.urdf", "nan");
-    check_refused(folder, to + ".", "folder");
-    check_refused(folder, to + "chain:0", "no number of bodies");
-    check_refused(folder, to + "chain:999999999999", "memory");
-    check_refused(folder, to + "chian:3", "cannot be generated");
+    check_refused(shell, to + "missing.urdf", "missing.urdf: there is no such file");
+    check_refused(shell, to + "text.urdf", "text.urdf:1");
+    check_refused(shell, to + "loop.urdf", "loop");
+    check_refused(shell, to + "roots.urdf", "two root links");
+    check_refused(shell, to + "mass.urdf", "-2");
+    check_refused(shell, to + "nan.urdf", "nan");
+    check_refused(shell, to + ".", "folder");
+    check_refused(shell, to + "chain:0", "no number of bodies");
+    check_refused(shell, to + "chain:999999999999", "memory");
+    check_refused(shell, to + "chian:3", "cannot be generated");
   }
 }
 
 TEST_CASE("options that make no sense are refused before anything is computed", "[command line]") {
-  const Folder folder;
-  check_refused(folder, "", "no command");
-  check_refused(folder, "rum chain:3", "did you mean run?");
-  check_refused(folder, "run", "MODEL");
-  check_refused(folder, "run chain:3 chain:4", "chain:4");
-  check_refused(folder, "run chain:3 --durration 5", "unknown option --durration; did you mean --duration?");
-  check_refused(folder, "run chain:3 --dt", "--dt");
-  check_refused(folder, "run chain:3 --dt 0", "the step is 0 s");
-  check_refused(folder, "run chain:3 --dt -1e-3", "must be positive");
-  check_refused(folder, "run chain:3 --dt nan", "nan");
-  check_refused(folder, "run chain:3 --dt 1ms", "--dt \"1ms\": expected seconds");
-  check_refused(folder, "run chain:3 --duration inf", "--duration inf");
-  check_refused(folder, "run chain:3 --duration 1e-4", "at least one step");
-  check_refused(folder, "run chain:3 --duration 1e10", "steps; at most 1e+12");
-  check_refused(folder, "run chain:3 --gravity 0,0", "three numbers");
-  check_refused(folder, "run chain:3 --gravity 0,0,inf", "finite");
-  check_refused(folder, "run chain:3 --solver newtn", "choose one of: newton, riqn");
-  check_refused(folder, "run chain:3 --guess ig4", "choose one of: extrapolation");
-  check_refused(folder, "run chain:3 --stop never", "choose one of: energy");
-  check_refused(folder, "run chain:3 --tolerance 0", "tolerance");
-  check_refused(folder, "run chain:3 --order 4", "only order 2 exists");
-  check_refused(folder, "run chain:3 --seed -1", "--seed");
-  check_refused(folder, "run chain:3 --spread nan", "--spread");
-  check_refused(folder, "run chain:3 --base floating", "leave --base out");
-  check_refused(folder, "run '" + kArm + "' --base loose", "choose one of: fixed, floating");
-  check_refused(folder, "inspect chain:3 --duration 3", "unknown option --duration");
+  const Shell shell;
+  check_refused(shell, "", "no command");
+  check_refused(shell, "rum chain:3", "did you mean run?");
+  check_refused(shell, "run", "MODEL");
+  check_refused(shell, "run chain:3 chain:4", "chain:4");
+  check_refused(shell, "run chain:3 --durration 5", "unknown option --durration; did you mean --duration?");
+  check_refused(shell, "run chain:3 --dt", "--dt");
+  check_refused(shell, "run chain:3 --dt 0", "the step is 0 s");
+  check_refused(shell, "run chain:3 --dt -1e-3", "must be positive");
+  check_refused(shell, "run chain:3 --dt nan", "nan");
+  check_refused(shell, "run chain:3 --dt 1ms", "--dt \"1ms\": expected seconds");
+  check_refused(shell, "run chain:3 --duration inf", "--duration inf");
+  check_refused(shell, "run chain:3 --duration 1e-4", "at least one step");
+  check_refused(shell, "run chain:3 --duration 1e10", "steps; at most 1e+12");
+  check_refused(shell, "run chain:3 --gravity 0,0", "three numbers");
+  check_refused(shell, "run chain:3 --gravity 0,0,inf", "finite");
+  check_refused(shell, "run chain:3 --solver newtn", "choose one of: newton, riqn");
+  check_refused(shell, "run chain:3 --guess ig4", "choose one of: extrapolation");
+  check_refused(shell, "run chain:3 --stop never", "choose one of: energy");
+  check_refused(shell, "run chain:3 --tolerance 0", "tolerance");
+  check_refused(shell, "run chain:3 --order 4", "only order 2 exists");
+  check_refused(shell, "run chain:3 --seed -1", "--seed");
+  check_refused(shell, "run chain:3 --spread nan", "--spread");
+  check_refused(shell, "run chain:3 --base floating", "leave --base out");
+  check_refused(shell, "run '" + kArm + "' --base loose", "choose one of: fixed, floating");
+  check_refused(shell, "inspect chain:3 --duration 3", "unknown option --duration");
 }
 
 TEST_CASE("outputs that cannot be written are refused before anything is computed", "[command line]") {
-  const Folder folder;
-  folder.write("model.json", "");
-  std::filesystem::create_directory(folder / "folder.csv");
-  check_refused(folder, "run chain:3 --record a.txt", "expected .csv");
-  check_refused(folder, "run chain:3 --json a", "expected .json");
-  check_refused(folder, "run chain:3 --plot a.jpg", "expected .svg or .png");
-  check_refused(folder, "run chain:3 --record nowhere/a.csv", "there is no folder nowhere");
-  check_refused(folder, "run chain:3 --record folder.csv", "this is a folder");
-  check_refused(folder, "run chain:3 --save folder.csv", "this is a folder");
-  check_refused(folder, "run chain:3 --json /proc/a.json", "cannot be written");
-  check_refused(folder, "run chain:3 --json a.json --save a.json", "both name");
-  check_refused(folder, "run model.json --json model.json", "overwrite the model");
-  check_refused(folder, "inspect model.json --json model.json", "overwrite the model");
-  check_refused(folder, "inspect chain:3 --json a.csv", "expected .json");
+  const Shell shell;
+  shell.write("model.json", "");
+  std::filesystem::create_directory(shell / "folder.csv");
+  check_refused(shell, "run chain:3 --record a.txt", "expected .csv");
+  check_refused(shell, "run chain:3 --json a", "expected .json");
+  check_refused(shell, "run chain:3 --plot a.jpg", "expected .svg or .png");
+  check_refused(shell, "run chain:3 --record nowhere/a.csv", "there is no folder nowhere");
+  check_refused(shell, "run chain:3 --record folder.csv", "this is a folder");
+  check_refused(shell, "run chain:3 --save folder.csv", "this is a folder");
+  check_refused(shell, "run chain:3 --json /proc/a.json", "cannot be written");
+  check_refused(shell, "run chain:3 --json a.json --save a.json", "both name");
+  check_refused(shell, "run model.json --json model.json", "overwrite the model");
+  check_refused(shell, "inspect model.json --json model.json", "overwrite the model");
+  check_refused(shell, "inspect chain:3 --json a.csv", "expected .json");
   // good outputs beside bad ones are not written either
-  check_refused(folder, "run chain:3 --record a.csv --json nowhere/a.json", "nowhere");
-  check_refused(folder, "run chain:0 --record a.csv --json a.json --plot a.svg --save a.checkpoint", "chain:0");
+  check_refused(shell, "run chain:3 --record a.csv --json nowhere/a.json", "nowhere");
+  check_refused(shell, "run chain:0 --record a.csv --json a.json --plot a.svg --save a.checkpoint", "chain:0");
 }
 
 TEST_CASE("energy that strays is said aloud", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("run chain:2 --dt 0.05 --duration 20 --spread 2 --json a.json");
+  const Shell shell;
+  const Outcome outcome = shell.linden("run chain:2 --dt 0.05 --duration 20 --spread 2 --json a.json");
   CHECK(outcome.exit_code == 0);
   CHECK_THAT(outcome.err, StartsWith("linden: warning: energy strays by") && Contains("try --dt 0.0125"));
-  CHECK(json_of(folder / "a.json").at("advice").is_string());
+  CHECK(json_of(shell / "a.json").at("advice").is_string());
 }
 
 TEST_CASE("what a file says and no run obeys is said aloud", "[command line]") {
-  const Folder folder;
-  CHECK_THAT(folder.linden("run '" + kArm + "' --duration 0.01").out, Contains("\nignored"));
-  CHECK_THAT(folder.linden("run chain:3 --duration 0.01").out, !Contains("ignored"));
+  const Shell shell;
+  CHECK_THAT(shell.linden("run '" + kArm + "' --duration 0.01").out, Contains("\nignored"));
+  CHECK_THAT(shell.linden("run chain:3 --duration 0.01").out, !Contains("ignored"));
 }
 
 TEST_CASE("a model's first five warnings are printed, inspect prints them all", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   std::string text = link_xml("a");
   for (int i = 0; i < 7; ++i) {
     const std::string child = fmt::format("b{}", i);
     text += link_xml(child) + joint_xml(fmt::format("j{}", i), "a", child, "revolute");
   }
-  folder.write("unlimited.urdf", robot_xml(text));
-  const Outcome run = folder.linden("run unlimited.urdf --duration 0.001");
+  shell.write("unlimited.urdf", robot_xml(text));
+  const Outcome run = shell.linden("run unlimited.urdf --duration 0.001");
   CHECK(run.exit_code == 0);
   CHECK(std::ranges::count(run.err, '\n') == 6);
   CHECK_THAT(run.err, StartsWith("linden: warning: unlimited.urdf:") && Contains("and 2 more (linden inspect shows all)"));
-  CHECK_THAT(folder.linden("inspect unlimited.urdf").out, Contains("\"j0\" is revolute") && Contains("\"j6\" is revolute"));
+  CHECK_THAT(shell.linden("inspect unlimited.urdf").out, Contains("\"j0\" is revolute") && Contains("\"j6\" is revolute"));
 }
 
 TEST_CASE("inspect prints every body, the conventions and the sweeps", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("inspect '" + kHand + "' --base floating --json a.json");
+  const Shell shell;
+  const Outcome outcome = shell.linden("inspect '" + kHand + "' --base floating --json a.json");
   CHECK(outcome.exit_code == 0);
   CHECK(outcome.err.empty());
   const Model model = load_urdf(kHand, Base::floating);
@@ -381,7 +381,7 @@ TEST_CASE("inspect prints every body, the conventions and the sweeps", "[command
   CHECK_THAT(outcome.out, Contains("unit quaternion x y z w") && Contains("angular x y z, then linear x y z"));
   CHECK_THAT(outcome.out, Contains("mimic joints") && Contains("gravity_force_up") && Contains("newton_factor_up"));
 
-  const nlohmann::json facts = json_of(folder / "a.json");
+  const nlohmann::json facts = json_of(shell / "a.json");
   CHECK(facts.at("table").size() == static_cast<std::size_t>(model.tree.bodies()));
   CHECK(facts.at("position_names") == model.names.position);
   CHECK(facts.at("mimics").size() == model.mimics.size());
@@ -390,29 +390,29 @@ TEST_CASE("inspect prints every body, the conventions and the sweeps", "[command
 }
 
 TEST_CASE("inspect lists only sweeps that run", "[command line]") {
-  const Folder folder;
-  const Outcome none = folder.linden("inspect chain:3 --gravity 0,0,0 --solver riqn");
+  const Shell shell;
+  const Outcome none = shell.linden("inspect chain:3 --gravity 0,0,0 --solver riqn");
   CHECK_THAT(none.out, !Contains("gravity_") && !Contains("newton_factor_up") && !Contains("fold_mimics"));
   CHECK_THAT(none.out, Contains("articulated_inertia_up") && Contains("displacement_down"));
 }
 
 TEST_CASE("inspect cuts long tables unless told otherwise", "[command line]") {
-  const Folder folder;
-  const std::string some = folder.linden("inspect chain:300").out, all = folder.linden("inspect chain:300 --all").out;
+  const Shell shell;
+  const std::string some = shell.linden("inspect chain:300").out, all = shell.linden("inspect chain:300 --all").out;
   CHECK_THAT(some, Contains("280 more; --all prints them") && !Contains("joint300"));
   CHECK_THAT(all, Contains("joint300") && !Contains("--all"));
 }
 
 TEST_CASE("help shows an example for every command", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   for (const char* arguments : {"--help", "run --help", "inspect --help"}) {
     INFO(arguments);
-    const Outcome outcome = folder.linden(arguments);
+    const Outcome outcome = shell.linden(arguments);
     CHECK(outcome.exit_code == 0);
     CHECK_THAT(outcome.out, Contains("Example") && Contains("linden "));
     CHECK(outcome.err.empty());
   }
-  const Outcome version = folder.linden("--version");
+  const Outcome version = shell.linden("--version");
   CHECK(version.exit_code == 0);
   CHECK_THAT(version.out, StartsWith("linden ") && Contains("."));
 }

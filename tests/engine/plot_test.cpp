@@ -8,19 +8,13 @@
 #include <vector>
 
 #include "engine/plot.hpp"
+#include "tests/engine/folder.hpp"
 #include "engine/plot_scale.hpp"
 
 namespace linden {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("linden-plot-test-" + std::to_string(::getpid()));
-  Folder() { fs::create_directories(path); }
-  ~Folder() { fs::remove_all(path); }
-  std::string file(const std::string& name) const { return (path / name).string(); }
-};
 
 plot::Chart wave(std::size_t samples) {
   plot::Series series{.label = "sine", .x = {}, .y = {}};
@@ -31,20 +25,15 @@ plot::Chart wave(std::size_t samples) {
   return {"A wave", "of a test", {"time [s]"}, {"height [m]"}, {series}};
 }
 
-std::string bytes_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 TEST_CASE("a chart becomes an SVG or a PNG by its ending, and nothing else is left in the folder") {
   const Folder folder;
   plot::draw(folder.file("wave.svg"), wave(1000));
   plot::draw(folder.file("wave.png"), wave(1000));
-  const std::string svg = bytes_of(folder.file("wave.svg"));
+  const std::string svg = text_of(folder.file("wave.svg"));
   CHECK_THAT(svg, Catch::StartsWith("<?xml"));
   for (const char* word : {"A wave", "time [s]", "height [m]", "sine"}) CHECK_THAT(svg, Catch::Contains(word));
-  CHECK(bytes_of(folder.file("wave.png")).substr(1, 3) == "PNG");
-  CHECK(std::distance(fs::directory_iterator(folder.path), fs::directory_iterator()) == 2);
+  CHECK(text_of(folder.file("wave.png")).substr(1, 3) == "PNG");
+  CHECK(folder.files() == std::set<std::string>{"wave.png", "wave.svg"});
 }
 
 TEST_CASE("a million samples make a small file") {
@@ -111,7 +100,7 @@ TEST_CASE("what cannot be drawn is refused with the reason, and no file appears"
   plot::Chart uneven = wave(10);
   uneven.series[0].y.pop_back();
   CHECK_THROWS(plot::draw(folder.file("uneven.svg"), uneven));
-  CHECK(fs::is_empty(folder.path));
+  CHECK(folder.files().empty());
 }
 
 }  // namespace

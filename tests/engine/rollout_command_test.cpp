@@ -13,19 +13,19 @@ const std::string kHand = LINDEN_MODELS_DIR "/hand.urdf";
 nlohmann::json json_of(const std::filesystem::path& file) { return nlohmann::json::parse(text_of(file)); }
 
 TEST_CASE("a rollout prints speed, energy over the instances and nothing else", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("rollout '" + kArm + "' --instances 50 --duration 0.05 --threads 2");
+  const Shell shell;
+  const Outcome outcome = shell.linden("rollout '" + kArm + "' --instances 50 --duration 0.05 --threads 2");
   CHECK(outcome.exit_code == 0);
   CHECK(outcome.err.empty());
   CHECK_THAT(outcome.out, Contains("instances   50") && Contains("env-steps/s") && Contains("50 steps of every instance"));
   CHECK_THAT(outcome.out, Contains("2 threads") && Contains("in the median") && Contains("seeds 1 to 50"));
-  CHECK(folder.files().empty());
+  CHECK(shell.files().empty());
 }
 
 TEST_CASE("the JSON of a rollout holds what its scripts need", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("rollout chain:5 --instances 33 --duration 0.02 --seed 4 --spread 0.5 --json a.json").exit_code == 0);
-  const nlohmann::json json = json_of(folder / "a.json");
+  const Shell shell;
+  REQUIRE(shell.linden("rollout chain:5 --instances 33 --duration 0.02 --seed 4 --spread 0.5 --json a.json").exit_code == 0);
+  const nlohmann::json json = json_of(shell / "a.json");
   CHECK(json["instances"] == 33);
   CHECK(json["steps"] == 20);
   CHECK(json["env_steps"] == 33 * 20);
@@ -38,74 +38,74 @@ TEST_CASE("the JSON of a rollout holds what its scripts need", "[command line]")
 }
 
 TEST_CASE("equal rollouts write equal files, whatever the threads, and other seeds others", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   for (const std::string ending : {".npz", ".h5"}) {
     const std::string rollout = "rollout chain:4 --instances 21 --duration 0.03 --every 10 --spread 1 --record ";
-    REQUIRE(folder.linden(rollout + "a" + ending + " --threads 1").exit_code == 0);
-    REQUIRE(folder.linden(rollout + "b" + ending + " --threads 3").exit_code == 0);
-    REQUIRE(folder.linden(rollout + "c" + ending + " --seed 5").exit_code == 0);
-    CHECK(text_of(folder / ("a" + ending)) == text_of(folder / ("b" + ending)));
-    CHECK(text_of(folder / ("a" + ending)) != text_of(folder / ("c" + ending)));
-    CHECK(text_of(folder / ("a" + ending)).size() > 1000);
+    REQUIRE(shell.linden(rollout + "a" + ending + " --threads 1").exit_code == 0);
+    REQUIRE(shell.linden(rollout + "b" + ending + " --threads 3").exit_code == 0);
+    REQUIRE(shell.linden(rollout + "c" + ending + " --seed 5").exit_code == 0);
+    CHECK(text_of(shell / ("a" + ending)) == text_of(shell / ("b" + ending)));
+    CHECK(text_of(shell / ("a" + ending)) != text_of(shell / ("c" + ending)));
+    CHECK(text_of(shell / ("a" + ending)).size() > 1000);
   }
 }
 
 TEST_CASE("a rollout of hundreds of short frames, or of nothing but frozen instances, ends", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("rollout chain:2 --instances 2 --duration 0.3 --record a.npz --json a.json", "timeout 60").exit_code == 0);
-  CHECK(json_of(folder / "a.json")["steps"] == 300);
-  CHECK(json_of(folder / "a.json")["frames"] == 301);
-  const Outcome frozen = folder.linden("rollout chain:3 --instances 3 --duration 100 --dt 0.5 --spread 500 --json b.json", "timeout 60");
+  const Shell shell;
+  REQUIRE(shell.linden("rollout chain:2 --instances 2 --duration 0.3 --record a.npz --json a.json", "timeout 60").exit_code == 0);
+  CHECK(json_of(shell / "a.json")["steps"] == 300);
+  CHECK(json_of(shell / "a.json")["frames"] == 301);
+  const Outcome frozen = shell.linden("rollout chain:3 --instances 3 --duration 100 --dt 0.5 --spread 500 --json b.json", "timeout 60");
   CHECK(frozen.exit_code == 1);
-  CHECK(json_of(folder / "b.json")["failures"] == 3);
+  CHECK(json_of(shell / "b.json")["failures"] == 3);
 }
 
 TEST_CASE("instances that fail are listed and end in exit code 1, with the file of the others", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   // steps far too long for links that spin this fast
   const Outcome outcome =
-      folder.linden("rollout chain:3 --instances 12 --duration 2 --dt 0.5 --spread 500 --record a.npz --json a.json");
+      shell.linden("rollout chain:3 --instances 12 --duration 2 --dt 0.5 --spread 500 --record a.npz --json a.json");
   CHECK(outcome.exit_code == 1);
   CHECK_THAT(outcome.err, Contains("instances failed and were frozen"));
   CHECK_THAT(outcome.out, Contains("frozen") && Contains("instance 0 at 0 s"));
-  CHECK(json_of(folder / "a.json")["failures"] > 0);
-  CHECK(folder.files() == std::set<std::string>{"a.json", "a.npz"});
+  CHECK(json_of(shell / "a.json")["failures"] > 0);
+  CHECK(shell.files() == std::set<std::string>{"a.json", "a.npz"});
 }
 
 TEST_CASE("an interrupted rollout says so, exits with 130 and leaves a valid file", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("rollout chain:4 --instances 64 --duration 1000 --every 100000 --record a.h5 --json a.json",
+  const Shell shell;
+  const Outcome outcome = shell.linden("rollout chain:4 --instances 64 --duration 1000 --every 100000 --record a.h5 --json a.json",
                                         "timeout --signal INT 1.5");
   // timeout passes its own 124 on
   CHECK((outcome.exit_code == 124 || outcome.exit_code == 130));
   CHECK_THAT(outcome.err, Contains("interrupted") && Contains("a.h5 is valid"));
-  CHECK(json_of(folder / "a.json")["interrupted"] == true);
-  CHECK(folder.files() == std::set<std::string>{"a.h5", "a.json"});
+  CHECK(json_of(shell / "a.json")["interrupted"] == true);
+  CHECK(shell.files() == std::set<std::string>{"a.h5", "a.json"});
 }
 
 TEST_CASE("single precision and mimic joints say what they cost", "[command line]") {
-  const Folder folder;
-  const Outcome single = folder.linden("rollout chain:4 --instances 20 --duration 0.01 --float");
+  const Shell shell;
+  const Outcome single = shell.linden("rollout chain:4 --instances 20 --duration 0.01 --float");
   CHECK_THAT(single.out, Contains("single precision") && Contains("tolerance 3e-06"));
-  const Outcome hand = folder.linden("rollout '" + kHand + "' --instances 3 --duration 0.01");
+  const Outcome hand = shell.linden("rollout '" + kHand + "' --instances 3 --duration 0.01");
   CHECK(hand.exit_code == 0);
   CHECK_THAT(hand.out, Contains("mimic joints"));
 }
 
 TEST_CASE("what a rollout cannot be is refused in one line", "[command line]") {
-  const Folder folder;
-  check_refused(folder, "rollout chain:3 --instances 0", "0 instances");
-  check_refused(folder, "rollout chain:3 --instances many", "--instances");
-  check_refused(folder, "rollout chain:1000 --instances 900000000", "900,000,000 instances of chain:1000 need about");
-  check_refused(folder, "rollout chain:3 --threads -2", "threads");
-  check_refused(folder, "rollout chain:3 --instructions sse9", "choose one of: scalar");
-  check_refused(folder, "rollout chain:3 --record a.csv", ".npz or .h5");
-  check_refused(folder, "rollout chain:3 --every 5", "--record");
-  check_refused(folder, "rollout chain:3 --record a.npz --every 0", "--every");
-  check_refused(folder, "rollout chain:3 --duration 0", "--duration");
-  check_refused(folder, "rollout chain:3 --tolerance -1", "tolerance");
-  check_refused(folder, "rollout nothing.urdf", "nothing.urdf");
-  check_refused(folder, "rollout chain:3 --instance 4", "did you mean --instances");
+  const Shell shell;
+  check_refused(shell, "rollout chain:3 --instances 0", "0 instances");
+  check_refused(shell, "rollout chain:3 --instances many", "--instances");
+  check_refused(shell, "rollout chain:1000 --instances 900000000", "900,000,000 instances of chain:1000 need about");
+  check_refused(shell, "rollout chain:3 --threads -2", "threads");
+  check_refused(shell, "rollout chain:3 --instructions sse9", "choose one of: scalar");
+  check_refused(shell, "rollout chain:3 --record a.csv", ".npz or .h5");
+  check_refused(shell, "rollout chain:3 --every 5", "--record");
+  check_refused(shell, "rollout chain:3 --record a.npz --every 0", "--every");
+  check_refused(shell, "rollout chain:3 --duration 0", "--duration");
+  check_refused(shell, "rollout chain:3 --tolerance -1", "tolerance");
+  check_refused(shell, "rollout nothing.urdf", "nothing.urdf");
+  check_refused(shell, "rollout chain:3 --instance 4", "did you mean --instances");
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // Rollout files read back to the same bits through the libraries of their formats and through Python, and appear whole or not at all.
 #include <fmt/format.h>
 #include <hdf5.h>
-#include <stdlib.h>
 #include <sys/resource.h>
 #include <zip.h>
 
@@ -24,6 +23,7 @@
 #include <vector>
 
 #include "engine/rollout_file.hpp"
+#include "tests/engine/folder.hpp"
 
 namespace linden {
 namespace {
@@ -33,43 +33,6 @@ using Catch::Matchers::Contains;
 using Catch::Matchers::EndsWith;
 
 const std::string kEndings[] = {".npz", ".h5"};
-
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "linden_rollout_XXXXXX").string();
-    REQUIRE(::mkdtemp(name.data()) != nullptr);
-    path_ = name;
-  }
-  ~Folder() { fs::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-  const fs::path& path() const { return path_; }
-  std::vector<std::string> files() const {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::recursive_directory_iterator(path_)) names.push_back(entry.path().filename().string());
-    std::ranges::sort(names);
-    return names;
-  }
-  /// Hidden entries are temporary.
-  std::vector<std::string> visible() const {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(path_)) {
-      if (const std::string name = entry.path().filename().string(); name[0] != '.') names.push_back(name);
-    }
-    return names;
-  }
-
- private:
-  fs::path path_;
-};
-
-std::string bytes_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
 
 // ---- plain readers
 
@@ -308,7 +271,7 @@ TEST_CASE("there is no file before the commit, and nothing else after it") {
     for (int f = 0; f < 3; ++f) add(file, Frame<double>(f));
     CHECK(folder.visible().empty());
     file.commit();
-    CHECK(folder.files() == std::vector{name});
+    CHECK(folder.files() == std::set<std::string>{name});
     CHECK_THROWS_WITH(add(file, Frame<double>(3)), Contains("cannot be written"));
     CHECK_THROWS_WITH(file.commit(), Contains("cannot be written"));
     CHECK(read(folder.file(name))["time"].shape[0] == 3);
@@ -325,10 +288,10 @@ TEST_CASE("what is not committed leaves nothing, and an older file as it was") {
       RolloutFile<float> file(folder.file(name), some_names(), kInstances);
       for (int f = 0; f < 3; ++f) add(file, Frame<float>(f));
     }
-    CHECK(folder.files() == std::vector{name});
-    CHECK(bytes_of(folder.file(name)) == "older");
+    CHECK(folder.files() == std::set<std::string>{name});
+    CHECK(text_of(folder.file(name)) == "older");
     write<float>(folder.file(name), 2);
-    CHECK(folder.files() == std::vector{name});
+    CHECK(folder.files() == std::set<std::string>{name});
     CHECK(read(folder.file(name))["time"].shape[0] == 2);
     fs::remove(folder.file(name));
   }
@@ -343,10 +306,10 @@ TEST_CASE("two files in one folder do not touch each other, and equal rollouts m
       add(b, Frame<double>(f));
     }
     a.commit();
-    CHECK(folder.visible() == std::vector{"a" + ending});
+    CHECK(folder.visible() == std::set<std::string>{"a" + ending});
     b.commit();
-    CHECK(folder.files() == std::vector{"a" + ending, "b" + ending});
-    CHECK(bytes_of(folder.file("a" + ending)) == bytes_of(folder.file("b" + ending)));
+    CHECK(folder.files() == std::set<std::string>{"a" + ending, "b" + ending});
+    CHECK(text_of(folder.file("a" + ending)) == text_of(folder.file("b" + ending)));
     for (const char* name : {"a", "b"}) fs::remove(folder.file(name + ending));
   }
 }
@@ -377,7 +340,7 @@ TEST_CASE("a file that cannot be written is named with the reason") {
     fs::remove(folder.file("taken" + ending));
   }
   CHECK_THROWS_WITH(write<double>(folder.file("roll.csv"), 1), Contains("\".csv\"; expected .npz or .h5"));
-  CHECK(folder.files() == std::vector<std::string>{"file"});
+  CHECK(folder.files() == std::set<std::string>{"file"});
 }
 
 TEST_CASE("a folder that vanishes is reported at the commit at the latest") {

@@ -17,8 +17,8 @@ std::vector<Value> column(const nlohmann::json& rows, const std::string& name) {
 }
 
 TEST_CASE("scaling prints a row for each size and solver, the exponents and nothing else", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("scaling --dofs 10..50 --solver newton,riqn --steps 20");
+  const Shell shell;
+  const Outcome outcome = shell.linden("scaling --dofs 10..50 --solver newton,riqn --steps 20");
   CHECK(outcome.exit_code == 0);
   CHECK(outcome.err.empty());
   CHECK_THAT(outcome.out, Contains("ns/body") && Contains("evaluations") && Contains("memory") && Contains("energy"));
@@ -26,13 +26,13 @@ TEST_CASE("scaling prints a row for each size and solver, the exponents and noth
     CHECK_THAT(outcome.out, Contains(row));
   }
   CHECK_THAT(outcome.out, Contains("newton: time ~ DOFs^") && Contains("riqn: time ~ DOFs^") && Contains("3 sizes from 10 DOFs on"));
-  CHECK(folder.files().empty());
+  CHECK(shell.files().empty());
 }
 
 TEST_CASE("the JSON of a scaling holds rows and fits", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("scaling --dofs 15..60 --solver riqn,newton --duration 0.013 --seed 3 --spread 0.2 --json a.json").exit_code == 0);
-  const nlohmann::json json = json_of(folder / "a.json");
+  const Shell shell;
+  REQUIRE(shell.linden("scaling --dofs 15..60 --solver riqn,newton --duration 0.013 --seed 3 --spread 0.2 --json a.json").exit_code == 0);
+  const nlohmann::json json = json_of(shell / "a.json");
   CHECK(json["shape"] == "chain");
   CHECK(json["seed"] == 3);
   REQUIRE(json["rows"].size() == 8);
@@ -57,80 +57,80 @@ TEST_CASE("the JSON of a scaling holds rows and fits", "[command line]") {
 }
 
 TEST_CASE("every shape comes near the degrees of freedom that were asked for, and no model twice", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   for (const std::string shape : {"chain", "ball-chain", "paper-chain", "binary", "random"}) {
     INFO(shape);
-    REQUIRE(folder.linden("scaling --shape " + shape + " --dofs 10..30 --steps 5 --json a.json").exit_code == 0);
-    const std::vector<int> dofs = column<int>(json_of(folder / "a.json")["rows"], "dofs");
+    REQUIRE(shell.linden("scaling --shape " + shape + " --dofs 10..30 --steps 5 --json a.json").exit_code == 0);
+    const std::vector<int> dofs = column<int>(json_of(shell / "a.json")["rows"], "dofs");
     REQUIRE(dofs.size() == 3);
     for (std::size_t k = 0; k < 3; ++k) CHECK(dofs[k] == Approx(10 * static_cast<double>(k + 1)).epsilon(0.4));
   }
-  REQUIRE(folder.linden("scaling --shape humanoids --dofs 10..110 --steps 5 --json a.json").exit_code == 0);
-  CHECK(column<int>(json_of(folder / "a.json")["rows"], "dofs") == std::vector{36, 108});
+  REQUIRE(shell.linden("scaling --shape humanoids --dofs 10..110 --steps 5 --json a.json").exit_code == 0);
+  CHECK(column<int>(json_of(shell / "a.json")["rows"], "dofs") == std::vector{36, 108});
 }
 
 TEST_CASE("without a number of steps, a row takes at least five", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("scaling --dofs 2000..2000 --json a.json").exit_code == 0);
-  CHECK(column<int>(json_of(folder / "a.json")["rows"], "steps").at(0) >= 5);
+  const Shell shell;
+  REQUIRE(shell.linden("scaling --dofs 2000..2000 --json a.json").exit_code == 0);
+  CHECK(column<int>(json_of(shell / "a.json")["rows"], "steps").at(0) >= 5);
 }
 
 TEST_CASE("a row that fails says so, and a solver that fails at every size ends in exit code 1", "[command line]") {
-  const Folder folder;
+  const Shell shell;
   // steps far too long for links that spin this fast
-  const Outcome outcome = folder.linden("scaling --dofs 10..20 --dt 0.5 --spread 500 --json a.json");
+  const Outcome outcome = shell.linden("scaling --dofs 10..20 --dt 0.5 --spread 500 --json a.json");
   CHECK(outcome.exit_code == 1);
   CHECK_THAT(outcome.err, Contains("newton failed at every size"));
   CHECK_THAT(outcome.out, Contains("chain:10: step 1: ") && Contains("no size to fit"));
-  const nlohmann::json json = json_of(folder / "a.json");
+  const nlohmann::json json = json_of(shell / "a.json");
   CHECK(json["failures"] == 2);
   CHECK(json["rows"][0]["seconds_per_step"].is_null());
   CHECK(json["fits"][0]["exponent"].is_null());
 }
 
 TEST_CASE("the picture of a scaling names its axes and every solver", "[command line]") {
-  const Folder folder;
-  REQUIRE(folder.linden("scaling --dofs 10..50 --solver newton,riqn --steps 5 --plot a.svg").exit_code == 0);
-  REQUIRE(folder.linden("scaling --dofs 10..10 --steps 5 --plot one.png").exit_code == 0);
+  const Shell shell;
+  REQUIRE(shell.linden("scaling --dofs 10..50 --solver newton,riqn --steps 5 --plot a.svg").exit_code == 0);
+  REQUIRE(shell.linden("scaling --dofs 10..10 --steps 5 --plot one.png").exit_code == 0);
   for (const char* word : {"degrees of freedom", "time per step [\u00b5s]", "newton, slope", "riqn, slope", "slope 1"}) {
-    CHECK_THAT(text_of(folder / "a.svg"), Contains(word));
+    CHECK_THAT(text_of(shell / "a.svg"), Contains(word));
   }
-  CHECK(folder.files() == std::set<std::string>{"a.svg", "one.png"});
+  CHECK(shell.files() == std::set<std::string>{"a.svg", "one.png"});
 }
 
 TEST_CASE("an interrupted scaling says so and keeps the rows that are done", "[command line]") {
-  const Folder folder;
-  const Outcome outcome = folder.linden("scaling --dofs 1..100000 --json a.json", "timeout --signal INT 1.5");
+  const Shell shell;
+  const Outcome outcome = shell.linden("scaling --dofs 1..100000 --json a.json", "timeout --signal INT 1.5");
   // timeout passes its own 124 on
   CHECK((outcome.exit_code == 124 || outcome.exit_code == 130));
   CHECK_THAT(outcome.err, Contains("interrupted after"));
-  const nlohmann::json json = json_of(folder / "a.json");
+  const nlohmann::json json = json_of(shell / "a.json");
   CHECK(json["interrupted"] == true);
   CHECK(json["rows"].size() < json["rows_planned"].get<std::size_t>());
 }
 
 TEST_CASE("what a scaling cannot be is refused in one line", "[command line]") {
-  const Folder folder;
-  check_refused(folder, "scaling --shape chian", "did you mean chain?");
-  check_refused(folder, "scaling --shape octopus", "choose one of: chain, ball-chain");
-  check_refused(folder, "scaling --dofs 10", "such as 10..10000");
-  check_refused(folder, "scaling --dofs 10..many", "such as 10..10000");
-  check_refused(folder, "scaling --dofs 100..10", "the smaller number first");
-  check_refused(folder, "scaling --dofs 0..10", "from 1 to");
-  check_refused(folder, "scaling --dofs 1..999999999999", "from 1 to");
-  check_refused(folder, "scaling --solver newtn", "choose one of: newton, riqn");
-  check_refused(folder, "scaling --solver newton,", "choose one of: newton, riqn");
-  check_refused(folder, "scaling --solver riqn,riqn", "names riqn twice");
-  check_refused(folder, "scaling --steps 0", "--steps");
-  check_refused(folder, "scaling --steps 5 --duration 1", "leave one of them out");
-  check_refused(folder, "scaling --duration 0", "--duration");
-  check_refused(folder, "scaling --dt 0", "the step is 0 s");
-  check_refused(folder, "scaling --spread -1", "--spread");
-  check_refused(folder, "scaling --json a.txt", ".json");
-  check_refused(folder, "scaling --plot a.jpg", ".svg or .png");
-  check_refused(folder, "scaling --plot no/a.png", "no folder");
-  check_refused(folder, "scaling --dof 10..20", "did you mean --dofs");
-  check_refused(folder, "scaling chain", "unexpected argument chain");
+  const Shell shell;
+  check_refused(shell, "scaling --shape chian", "did you mean chain?");
+  check_refused(shell, "scaling --shape octopus", "choose one of: chain, ball-chain");
+  check_refused(shell, "scaling --dofs 10", "such as 10..10000");
+  check_refused(shell, "scaling --dofs 10..many", "such as 10..10000");
+  check_refused(shell, "scaling --dofs 100..10", "the smaller number first");
+  check_refused(shell, "scaling --dofs 0..10", "from 1 to");
+  check_refused(shell, "scaling --dofs 1..999999999999", "from 1 to");
+  check_refused(shell, "scaling --solver newtn", "choose one of: newton, riqn");
+  check_refused(shell, "scaling --solver newton,", "choose one of: newton, riqn");
+  check_refused(shell, "scaling --solver riqn,riqn", "names riqn twice");
+  check_refused(shell, "scaling --steps 0", "--steps");
+  check_refused(shell, "scaling --steps 5 --duration 1", "leave one of them out");
+  check_refused(shell, "scaling --duration 0", "--duration");
+  check_refused(shell, "scaling --dt 0", "the step is 0 s");
+  check_refused(shell, "scaling --spread -1", "--spread");
+  check_refused(shell, "scaling --json a.txt", ".json");
+  check_refused(shell, "scaling --plot a.jpg", ".svg or .png");
+  check_refused(shell, "scaling --plot no/a.png", "no folder");
+  check_refused(shell, "scaling --dof 10..20", "did you mean --dofs");
+  check_refused(shell, "scaling chain", "unexpected argument chain");
 }
 
 }  // namespace

@@ -1,22 +1,11 @@
 // State in, state out, mimic joints, checkpoints.
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
+#include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {
 namespace {
-
-namespace fs = std::filesystem;
-
-/// A folder of its own, gone at the end.
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("linden-test-" + std::to_string(::getpid()));
-  Folder() { fs::create_directories(path); }
-  ~Folder() { fs::remove_all(path); }
-  std::string file(const std::string& name) const { return (path / name).string(); }
-};
 
 TEST_CASE("velocities come back as they were given") {
   for (const std::string& file : all_robots()) {
@@ -104,10 +93,9 @@ TEST_CASE("a checkpoint that does not fit is refused and changes nothing") {
   Simulation simulation(chain(5), {.step = 1e-3});
   run(simulation, 10);
   simulation.save(folder.file("state"));
-  std::ifstream in(folder.file("state"), std::ios::binary);
-  std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const std::string bytes = text_of(folder / "state");
   const auto write = [&](const std::string& text) {
-    std::ofstream(folder.file("other"), std::ios::binary) << text;
+    folder.write("other", text);
     return folder.file("other");
   };
 
