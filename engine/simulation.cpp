@@ -11,10 +11,10 @@
 
 namespace linden {
 
-Simulation::Simulation(Model model, const Options& options)
-    : Simulation(std::make_shared<const Model>(std::move(model)), options) {}
+Simulation::Simulation(Model model, const Options& options, const Effects& effects)
+    : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
-Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options)
+Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects&)
     : model_(std::move(model)), options_(options), stepper_(*model_, options) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "engine/stepper.hpp"
+#include "layout/effects.hpp"
 
 namespace linden {
 
@@ -28,9 +29,9 @@ struct Momentum {
 
 class Simulation {
  public:
-  /// At rest in the model's zero configuration. Throws InputError for options that make no sense.
-  explicit Simulation(Model model, const Options& options = {});
-  explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {});
+  /// At rest in the model's zero configuration. Throws InputError for options and effects that make no sense.
+  explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
+  explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
 
   const Model& model() const { return *model_; }
   const Options& options() const { return options_; }

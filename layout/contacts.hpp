@@ -1,0 +1,42 @@
+// layout/contacts.hpp
+// Where bodies may touch the ground: the collision shapes of a robot's file, reduced to what a plane can meet first.
+//
+//   shape      spheres                      rims
+//   sphere     one
+//   box        one of radius 0 a corner
+//   capsule    one at each end
+//   cylinder                                one at each end
+//   mesh       the corners of its bounding box
+//
+// All in the frame of the body that carries the link (slot 0: fixed to the world, never in here).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "layout/field.hpp"
+
+namespace linden {
+
+/// A ball of matter; radius 0: a corner.
+struct ContactSphere {
+  Index slot;
+  std::array<double, 3> center;  // [m]
+  double radius;                 // [m]
+};
+
+/// The edge of a disc: of its points the lowest touches first, and those a quarter turn away hold it upright.
+struct ContactRim {
+  Index slot;
+  std::array<double, 3> center;  // [m]
+  std::array<double, 3> axis;    // unit length
+  double radius;                 // [m]
+};
+
+struct Contacts {
+  std::vector<ContactSphere> spheres;  // sorted by slot
+  std::vector<ContactRim> rims;        // sorted by slot
+  bool empty() const { return spheres.empty() && rims.empty(); }
+};
+
+}  // namespace linden

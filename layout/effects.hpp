@@ -1,0 +1,132 @@
+// layout/effects.hpp
+// What acts on the bodies and joints of a scene beside gravity, as plain values: one list an effect, an empty list where the scene has
+// none of it. Rows are velocity rows of screw joints, slots bodies; model.names says which is which. kernels/effects/ has a file for
+// each with its equation, its energy and its cost.
+//
+//   Effects effects;
+//   effects.damping = urdf_damping(model);
+//   effects.servo.push_back({.row = elbow, .stiffness = 200, .damping = 20, .target = 0.4});
+//   Simulation simulation(model, options, effects);
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "layout/contacts.hpp"
+#include "layout/field.hpp"
+
+namespace linden {
+
+/// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend.
+struct Course {
+  std::vector<double> times{0};
+  std::vector<double> values{0};
+  double at(double time) const;
+};
+
+/// Inertia of a rotor that a joint turns along.
+struct Armature {
+  Index row;
+  double inertia;  // [kg m^2, kg]
+};
+
+struct JointSpring {
+  Index row;
+  double stiffness;  // [N m/rad, N/m]
+  double rest = 0;   // [rad, m]
+};
+
+/// Pulls a ball joint towards an orientation by an angle's worth of torque.
+struct BallSpring {
+  Index slot;
+  double stiffness;                        // [N m/rad]
+  std::array<double, 4> rest{0, 0, 0, 1};  // unit quaternion x y z w
+};
+
+struct JointDamping {
+  Index row;           // of a screw, or any row of a ball joint
+  double coefficient;  // [N m s/rad, N s/m]
+};
+
+/// Coulomb friction: holds the joint still below it, opposes its motion by it.
+struct JointFriction {
+  Index row;
+  double force;  // [N m, N]
+};
+
+struct JointLimit {
+  Index row;
+  double lower = -std::numeric_limits<double>::infinity();  // [rad, m]
+  double upper = std::numeric_limits<double>::infinity();
+  double restitution = 0;  // 0: stops, 1: bounces back at the same speed
+};
+
+/// A force of stiffness (target - q) - damping qdot on a joint, at most max_force.
+struct Servo {
+  Index row;
+  double stiffness;    // [N m/rad, N/m]
+  double damping = 0;  // [N m s/rad, N s/m]
+  double target = 0;   // [rad, m]
+  double max_force = std::numeric_limits<double>::infinity();  // [N m, N]
+};
+
+struct JointTorque {
+  Index row;
+  Course force;  // [N m, N]
+};
+
+/// A wrench on a body.
+struct BodyWrench {
+  Index slot;
+  std::array<double, 3> point{};   // where the force acts, body frame [m]
+  std::array<double, 3> force{};   // [N]
+  std::array<double, 3> moment{};  // [N m]
+  bool in_world = true;            // directions of force and moment: the world's, or the body's
+  double from = -std::numeric_limits<double>::infinity();  // [s]
+  double to = std::numeric_limits<double>::infinity();
+  Course scale{{0}, {1}};          // force and moment over time, as shares of the above
+};
+
+/// -(linear + quadratic |v|) v at the centre of mass, v relative to the wind.
+struct Drag {
+  Index slot;
+  double linear = 0;     // [N s/m]
+  double quadratic = 0;  // [N s^2/m^2]
+};
+
+/// Heights over the ground's plane on a grid, straight between its points; beyond its edges the last row goes on.
+struct HeightField {
+  Index columns, rows;           // along x, along y of the plane; 2 or more each
+  double spacing_x, spacing_y;   // [m]
+  double origin_x, origin_y;     // of heights[0], in the plane's frame [m]
+  std::vector<double> heights;   // [rows x columns], row by row [m]
+};
+
+struct Ground {
+  std::array<double, 3> normal{0, 0, 1};  // unit length, world frame
+  double height = 0;                      // of the plane along its normal [m]
+  double stiffness = 1e5;                 // of one contact point [N/m]
+  double damping = 0;                     // of one contact point along the normal [N s/m]
+  double friction = 0.8;                  // Coulomb's coefficient
+  std::optional<HeightField> terrain;
+  Contacts contacts;
+};
+
+struct Effects {
+  std::vector<Armature> armature;
+  std::vector<JointSpring> springs;
+  std::vector<BallSpring> ball_springs;
+  std::vector<JointDamping> damping;
+  std::vector<JointFriction> friction;
+  std::vector<JointLimit> limits;
+  std::vector<Servo> servos;
+  std::vector<JointTorque> torques;
+  std::vector<BodyWrench> wrenches;
+  std::vector<Drag> drag;
+  std::array<double, 3> wind{0, 0, 0};  // [m/s], world frame
+  std::optional<Ground> ground;
+};
+
+}  // namespace linden
