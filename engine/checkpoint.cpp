@@ -102,6 +102,7 @@ void Simulation::load(const std::string& file) {
   state_ = loaded;
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);
+  effect_work_ = {};
   stepper_.refresh(state_);
 }
 

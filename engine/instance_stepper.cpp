@@ -9,8 +9,8 @@
 
 namespace linden {
 
-InstanceStepper::InstanceStepper(const Model& model, const Options& options)
-    : model_(model), options_(options), stepper_(model, options) {
+InstanceStepper::InstanceStepper(const Model& model, const Options& options, const EffectPlan* plan)
+    : model_(model), options_(options), stepper_(model, options, plan) {
   state_.allocate(model.tree.shape);
   rate_.allocate(model.tree.shape.velocities);
 }
@@ -36,10 +36,10 @@ void InstanceStepper::refresh() {
   stepper_.refresh(state_);
 }
 
-StepReport InstanceStepper::step() {
+StepReport InstanceStepper::step(double time) {
   refresh();
   int history = 0;
-  return stepper_.step(state_, history, options_.step);
+  return stepper_.step(state_, history, time, options_.step);
 }
 
 void InstanceStepper::set_velocities(std::span<const double> v) {

@@ -11,7 +11,7 @@ namespace linden {
 
 class InstanceStepper {
  public:
-  InstanceStepper(const Model& model, const Options& options);
+  InstanceStepper(const Model& model, const Options& options, const EffectPlan* plan = nullptr);
   // not inline: compiled for every processor, where those that use it are compiled for one
   ~InstanceStepper();
 
@@ -22,8 +22,8 @@ class InstanceStepper {
   /// Generalized forces [nv] to be written; from the first call on they count.
   std::span<double> applied();
 
-  /// One step of the state. state().pace says what is known of the step before.
-  StepReport step();
+  /// One step of the state, from `time` on. state().pace says what is known of the step before.
+  StepReport step(double time);
   /// p = M(q) v.
   void set_velocities(std::span<const double> v);
   /// Energy; and rate() is v = M^-1 p.

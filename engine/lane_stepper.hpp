@@ -391,7 +391,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   [[gnu::noinline]] bool step_alone(const Block<Real>& block, int l) {
     State<double>& state = alone_.state();
     take_out(block, l);
-    const StepReport report = alone_.step();
+    const StepReport report = alone_.step(static_cast<double>(block.instances[l].steps) * options_.step);
     InstanceRecord& instance = block.instances[l];
     instance.evaluations += report.evaluations;
     instance.displacements = 0;

@@ -14,8 +14,9 @@ namespace linden {
 Simulation::Simulation(Model model, const Options& options, const Effects& effects)
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
-Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects&)
-    : model_(std::move(model)), options_(options), stepper_(*model_, options) {
+Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
+    : model_(std::move(model)), options_(options), plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
+      stepper_(*model_, options, plan_.get()) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
@@ -71,8 +72,11 @@ void Simulation::set_forces(std::span<const double> force) {
 }
 
 StepReport Simulation::step() {
-  const StepReport report = stepper_.step(state_, history_, options_.step);
-  if (report.ok()) ++steps_;
+  const StepReport report = stepper_.step(state_, history_, time(), options_.step);
+  if (report.ok()) {
+    ++steps_;
+    effect_work_.add(stepper_.effect_work());
+  }
   return report;
 }
 

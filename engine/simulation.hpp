@@ -57,6 +57,9 @@ class Simulation {
   std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
 
   Energy energy();
+  /// What effects gave and took since the start, or since a checkpoint was loaded [J]. Total energy plus what was taken less what was given
+  /// stays.
+  const EffectWork<double>& effect_work() const { return effect_work_; }
   Momentum momentum();
 
   /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step
@@ -70,9 +73,11 @@ class Simulation {
 
   std::shared_ptr<const Model> model_;
   Options options_;
+  std::unique_ptr<const EffectPlan> plan_;
   State<double> state_;
   Stepper stepper_;
   Field<double> rate_;
+  EffectWork<double> effect_work_;
   std::int64_t steps_ = 0;
   int history_ = 0;
 };

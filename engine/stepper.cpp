@@ -35,11 +35,20 @@ constexpr double kExtrapolation[kHistory][kHistory] = {
 /// Bodies that the sweeps of a part of a step go over before the next part: 64 of some 600 bytes stay in the nearest cache.
 constexpr Index kPart = 64;
 
+/// Revisions of effects' states in one solve: a pile of joints that stick and slide at once takes some ten.
+constexpr int kMostRevisions = 60;
+
+/// Relative residual from which on impulses that hold a joint or a contact are those of the solution, but for this much.
+constexpr double kSettled = 1e-4;
+
+/// Share of its kinetic energy that a scene with effects may have back a step after an impact took it.
+constexpr double kImpactMemory = 0.9;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-Stepper::Stepper(const Model& model, const Options& options)
+Stepper::Stepper(const Model& model, const Options& options, const EffectPlan* plan)
     : model_(model),
       constants_(&model.constants),
       options_(options),
@@ -50,6 +59,8 @@ Stepper::Stepper(const Model& model, const Options& options)
   check(options);
   work_.allocate(model.tree.shape);
   last_good_.allocate(model.tree.shape);
+  if (plan != nullptr && plan->any()) effects_ = std::make_unique<EffectSweeps<double>>(*plan, model);
+  if (effects_) before_.allocate(model.tree.shape.velocities);
 }
 
 void Stepper::refresh(const State<double>& state) {
@@ -58,6 +69,9 @@ void Stepper::refresh(const State<double>& state) {
     if (gravity_) gravity_field_down(model_.tree, work_.placement, gravity_vector(), part, work_.field);
   });
   forces();
+  if (!effects_) return;
+  effect_potential_ = effects_->refresh(work_.placement, state.q);
+  potential_ = (gravity_ ? potential_ : 0) + effect_potential_;
 }
 
 void Stepper::apply(std::span<const double> force) {
@@ -79,8 +93,10 @@ void Stepper::forces() {
 
 Vec3<double> Stepper::gravity_vector() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
 
-StepReport Stepper::step(State<double>& state, int& history, double h) {
+StepReport Stepper::step(State<double>& state, int& history, double time, double h) {
   StepReport report;
+  time_ = time;
+  effect_work_ = {};
   report.status = solve(state, history, h, report);
   if (report.ok()) {
     finish(state, history, h);
@@ -99,6 +115,7 @@ StepReport Stepper::step(State<double>& state, int& history, double h) {
   report.residual = failed_residual_;
   state = last_good_;
   history = history_before;
+  effect_work_ = {};
   refresh(state);
   return report;
 }
@@ -138,18 +155,57 @@ void Stepper::in_parts_up(const Action& action) const {
 template <class Motions>
 Stepper::Evaluated Stepper::evaluate(StepReport& report, const Motions& motions) {
   report.evaluations += 1;
-  Evaluated result{1, 0, 0};
+  Evaluated result{1, 0, 0, 0};
   in_parts_down([&](Slots part) {
     motions(part);
     const double least = displacement_down(model_.tree, work_.placement, work_.motion, part, work_.displacement);
     result.least_w = std::min(result.least_w, least);
     result.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
   });
+  result.scale = result.energy;
+  if (effects_) act(result);
   return result;
 }
 
+/// Effects on bodies and joints, for the displacements of an evaluation.
+void Stepper::act(Evaluated& now) {
+  const EffectPlan& plan = effects_->plan();
+  if (plan.bodies) {
+    if (guess_points_) effects_->guess_points(work_.displacement);
+    guess_points_ = false;
+    effects_->bodies(all_slots(model_.tree), *constants_, work_.displacement, work_.impulse);
+  }
+  if (plan.joints) {
+    if (plan.balls) displacement_map(model_.tree, work_.motion, work_.delta);
+    effects_->joints(work_.delta, work_.motion, work_.momentum_target);
+    now.energy += armature_energy<double>(plan.effects.armature, work_.delta);
+  }
+  now.scale = now.energy + effect_scale_;
+}
+
+/// action(added): what effects add to a factor.
+template <class Action>
+void Stepper::with_added(const Action& action) {
+  if (!effects_) return action(NothingAdded{});
+  const Field<double>& stiffness = effects_->joint_sum().stiffness;
+  const Field<double, 36>& pull = effects_->body_sum().pull;
+  const EffectPlan& plan = effects_->plan();
+  if (plan.joints && plan.bodies) return action(EffectsAdded<double, true, true>{stiffness, pull});
+  if (plan.joints) return action(EffectsAdded<double, true, false>{stiffness, pull});
+  action(EffectsAdded<double, false, true>{stiffness, pull});
+}
+
 void Stepper::factor_mass() {
-  articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains());
+  if (effects_ && effects_->plan().rotor.rows() > 0) {
+    const EffectsAdded<double, true, false> rotors{effects_->plan().rotor, effects_->body_sum().pull};
+    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), rotors);
+  } else {
+    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains());
+  }
+  tie_rates();
+}
+
+void Stepper::tie_rates() {
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
@@ -161,8 +217,15 @@ void Stepper::factor_mass() {
 
 void Stepper::factor(StepReport& report) {
   report.factorisations += 1;
-  if (options_.solver == Solver::riqn) return factor_mass();
-  newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains());
+  if (options_.solver == Solver::riqn) {
+    with_added([&](const auto& added) {
+      articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
+    });
+    return tie_rates();
+  }
+  with_added([&](const auto& added) {
+    newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains(), added);
+  });
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
@@ -188,9 +251,12 @@ double Stepper::factor_and_pass(Evaluated& now, StepReport& report) {
   }
   report.factorisations += 1;
   double norm = 0;
-  in_parts_up([&](Slots part) {
-    newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains());
-    norm += innovation_up(model_.tree, *constants_, part, work_);
+  with_added([&](const auto& added) {
+    in_parts_up([&](Slots part) {
+      newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains(),
+                       added);
+      norm += innovation_up(model_.tree, *constants_, part, work_);
+    });
   });
   return norm;
 }
@@ -202,6 +268,7 @@ double Stepper::factor_and_pass_again(Evaluated& now, StepReport& report) {
     return pass_residual();
   }
   momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
+  if (effects_) act(now);
   return factor_and_pass(now, report);
 }
 
@@ -250,7 +317,34 @@ Stepper::Evaluated Stepper::solve_and_correct(StepReport& report) {
 
 bool Stepper::converged(const Evaluated& now, double norm, double h) const {
   if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * h;
-  return 0.5 * norm <= options_.tolerance * options_.tolerance * now.energy;
+  return 0.5 * norm <= options_.tolerance * options_.tolerance * now.scale;
+}
+
+/// h^2 x kinetic energy that gravity gives in a step to what is at rest.
+double Stepper::fall(double h) const {
+  const auto& g = options_.gravity;
+  return 0.5 * constants_->subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
+}
+
+void Stepper::begin_effects(const State<double>& state, int history, double h) {
+  if (effects_->plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects_->plain_target().flat().begin());
+  const auto past = [&](Index row, int steps) { return state.history(row, steps - 1); };
+  effects_->begin(time_ + 0.5 * h, h, state.q, past, history >= 2, work_.delta);
+  if (history > 0) {
+    for (Index row = 0; row < before_.rows(); ++row) before_(row) = state.history(row, 0);
+  } else {
+    velocity_of(state.p, before_);
+    for (double& value : before_.flat()) value *= h;
+  }
+  effect_scale_ = fall(h);
+  guess_points_ = true;
+}
+
+/// Whether the state of an effect changed; work_.delta then says what the motion is to be.
+bool Stepper::revise_effects(bool settled) {
+  if (!effects_->revise(left(), settled, work_.delta)) return false;
+  displacement_map(model_.tree, work_.motion, work_.delta);
+  return true;
 }
 
 Index Stepper::worst_displacement() const {
@@ -299,9 +393,7 @@ Index Stepper::largest_residual() const {
 /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small beside
 /// the motion, or beside what gravity alone would do to it where all is at rest.
 bool Stepper::at_rounding_floor(const Evaluated& now, double norm, double h, double epsilons) const {
-  const auto& g = options_.gravity;
-  const double fall = 0.5 * constants_->subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
-  if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
+  if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall(h)))) return false;
   const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
   const double unit = epsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;
@@ -363,7 +455,14 @@ bool Stepper::gains_energy(const State<double>& state, double h) {
   displacement_map(model_.tree, work_.motion, work_.delta);
   kinetic_ = momentum_energy_ / (h * h);
   const double before = state.pace(0, 0);
-  const double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + work(work_.force));
+  double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + work(work_.force));
+  if (effects_) {
+    solved_work_ = effects_->work(left(), work_.delta, before_, state.pace(0, 0) > 0);
+    // forces that nearly balance leave less kinetic energy than their works, taken half a step apart, differ by
+    double activity = effects_->activity(solved_work_, work_.motion, work_.delta) + effect_potential_;
+    for (Index row = 0; row < model_.tree.shape.velocities; ++row) activity += std::abs(work_.force(row) * work_.delta(row));
+    gain -= activity;
+  }
   return gain > kMostGain * std::max(kinetic_, before);
 }
 
@@ -371,6 +470,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(state, history, h);
   spread_mimics<double>(ties_.mimics(), work_.delta);  // corrections keep ties, so the guess must
+  if (effects_) begin_effects(state, history, h);
   const auto start = [&](Slots part) { motion_map(model_.tree, *constants_, work_.delta, part, work_.motion); };
   Evaluated now = evaluate(report, start);
   if (!now.usable()) {
@@ -383,7 +483,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
 
   const auto end = [&](StepStatus status) {
-    const double relative = now.energy > 0 ? std::sqrt(0.5 * norm / now.energy) : std::sqrt(norm);
+    const double relative = now.scale > 0 ? std::sqrt(0.5 * norm / now.scale) : std::sqrt(norm);
     if (status == StepStatus::converged) {
       momentum_energy_ = now.energy;
       report.residual = std::max(report.residual, relative);
@@ -404,23 +504,46 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     return kInfinity;
   };
 
+  // the evaluation and factor for other states of effects, where they changed
+  const bool revises = effects_ && effects_->plan().revises;
+  int revisions = 0;
+  const auto revised = [&](bool settled) {
+    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kMostRevisions || !revise_effects(settled)) return false;
+    revisions += 1;
+    report.iterations += 1;
+    now = evaluate(report, start);
+    norm = factor_and_pass(now, report);
+    fresh = true;
+    return true;
+  };
+
+  bool at_floor = false;
   for (int iteration = 0;; ++iteration) {
     if (!std::isfinite(norm) || !now.usable()) {
       report.slot = worst_displacement();
       return end(StepStatus::not_finite);
     }
-    if (converged(now, norm, h)) return end(StepStatus::converged);
-    if (iteration == max_iterations_) return end(StepStatus::not_converged);
+    const bool done = at_floor || converged(now, norm, h);
+    if (revised(done || 0.5 * norm <= kSettled * kSettled * now.scale)) {
+      at_floor = false;
+      continue;
+    }
+    if (done && revisions < kMostRevisions) {
+      report.at_rounding_floor |= at_floor;
+      return end(StepStatus::converged);
+    }
+    if (iteration >= max_iterations_ || done) return end(StepStatus::not_converged);
 
     const double before = norm;
     double taken = 1;
     norm = try_out(solve_and_correct(report));
+    if (revised(false)) continue;
     const bool slow = norm > kSlowProgress * kSlowProgress * before;
-    const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.energy;
+    const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.scale;
     if ((slow && at_rounding_floor(now, norm, h, kFloorEpsilons)) ||
         (close && !converged(now, norm, h) && at_rounding_floor(now, norm, h, kBareRounding))) {
-      report.at_rounding_floor = true;
-      return end(StepStatus::converged);
+      at_floor = true;
+      continue;
     }
     for (int cut = 0; !(norm < before) && cut < kMaxBacktracks; ++cut) {
       taken /= 2;
@@ -430,8 +553,8 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     if (!(norm < before)) {
       norm = try_out(correct(-taken, report));  // back to where this iteration began
       if (at_rounding_floor(now, norm, h, kFloorEpsilons)) {
-        report.at_rounding_floor = true;
-        return end(StepStatus::converged);
+        at_floor = true;
+        continue;
       }
       if (fresh || options_.solver == Solver::riqn) return end(trouble);
     }
@@ -447,6 +570,9 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
 void Stepper::finish(State<double>& state, int& history, double h) {
   const Tree& tree = model_.tree;
   const double work_at_begin = work(work_.force);
+  const bool joints = effects_ && effects_->plan().joints;
+  if (joints) effects_->end_joints(work_.delta, work_.motion, one_pass_ ? work_.innovation : work_.residual, work_.increment);
+  if (effects_ && effects_->plan().bodies) effects_->end_bodies(work_.placement, work_.impulse);
   for (Index row = 0; row < tree.shape.velocities; ++row) {
     for (int k = kHistory - 1; k > 0; --k) state.history(row, k) = state.history(row, k - 1);
     state.history(row, 0) = work_.delta(row);
@@ -457,10 +583,21 @@ void Stepper::finish(State<double>& state, int& history, double h) {
     state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
   refresh(state);
-  state.pace(0, 0) = kinetic_;
   state.pace(0, 1) = 0.5 * (work_at_begin + work(work_.force));
+  if (effects_) {
+    // an impact may take in one step what the next gives back
+    state.pace(0, 0) = std::max(kinetic_, kImpactMemory * state.pace(0, 0));
+    solved_work_.ground -= effects_->ground_stored();
+    effect_work_.add(solved_work_);
+    time_ += h;
+  } else {
+    state.pace(0, 0) = kinetic_;
+  }
   momentum_update_map(tree, *constants_, h, work_.displacement, work_.impulse,
                       one_pass_ ? work_.innovation : work_.residual, work_.force, state.p);
+  if (joints) {
+    for (Index row = 0; row < tree.shape.velocities; ++row) state.p(row) += work_.increment(row);
+  }
   fold_mimics(ties_.mimics(), state.p);
 }
 
@@ -486,6 +623,7 @@ void Stepper::momentum_of(const Field<double>& v, Field<double>& p) {
   velocity_down(model_.tree, *constants_, work_.placement, v, work_.twist);
   momentum_of_map(model_.tree, *constants_, work_.twist, work_.impulse);
   impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, p);
+  if (effects_) add_armature<double>(effects_->plan().effects.armature, v, p);
   fold_mimics(ties_.mimics(), p);
 }
 

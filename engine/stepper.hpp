@@ -10,6 +10,9 @@
 //   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
 //   advance_map, placement_map, gravity, momentum_update_map
 //
+// Effects (effect_sweeps.hpp), where a scene has any, act after momentum_map and on the target, are part of the factor, and have their
+// states - sticks, slides, at a limit - revised between corrections.
+//
 // The equation may have other roots, far from the motion, once a step is too large for it. Whoever lands on one gains energy out of
 // nothing: kinetic energy of the mean motion minus the work of the forces is compared with the step before.
 //
@@ -17,9 +20,11 @@
 // Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "engine/effect_sweeps.hpp"
 #include "engine/options.hpp"
 #include "engine/step_report.hpp"
 #include "kernels/articulated.hpp"
@@ -31,13 +36,14 @@ namespace linden {
 
 struct Energy {
   double kinetic = 0;    // 1/2 p.M^-1 p [J]
-  double potential = 0;  // of gravity [J]; zero where the centre of mass is at the height of the world's origin
+  double potential = 0;  // of gravity (zero where the centre of mass is at the height of the world's origin), springs and ground [J]
   double total() const { return kinetic + potential; }
 };
 
 class Stepper {
  public:
-  Stepper(const Model& model, const Options& options);
+  /// plan: the effects beside gravity, which must outlive the stepper; null: none.
+  Stepper(const Model& model, const Options& options, const EffectPlan* plan = nullptr);
 
   /// Brings placements and forces to the positions in `state`; call after any change of them from outside.
   void refresh(const State<double>& state);
@@ -47,8 +53,10 @@ class Stepper {
   /// Masses and inertias of an instance that differs from the model, followed by a refresh. They must live as long as they are used.
   void use(const BodyConstants<double>& constants) { constants_ = &constants; }
 
-  /// One step of `h` seconds. `history`: how many rows of state.history are valid; updated.
-  StepReport step(State<double>& state, int& history, double h);
+  /// One step of `h` seconds, `time` at its beginning. `history`: how many rows of state.history are valid; updated.
+  StepReport step(State<double>& state, int& history, double time, double h);
+  /// Of effects, in the step taken last.
+  const EffectWork<double>& effect_work() const { return effect_work_; }
 
   /// v = M(q)^-1 p, for the positions of the last refresh or step.
   void velocity_of(const Field<double>& p, Field<double>& v);
@@ -66,6 +74,7 @@ class Stepper {
     double least_w;    // see displacement_down
     double energy;     // h^2 x kinetic energy of the mean motion
     double plain;      // |h r|^2
+    double scale;      // what a residual is compared with: energy, with effects also what gravity gives in a step
     bool usable() const;
   };
 
@@ -78,6 +87,7 @@ class Stepper {
   Evaluated evaluate(StepReport& report, const Motions& motions);
   void factor(StepReport& report);
   void factor_mass();
+  void tie_rates();
   double pass_up(Evaluated& now);
   double pass_residual();
   double factor_and_pass(Evaluated& now, StepReport& report);
@@ -87,6 +97,13 @@ class Stepper {
   Evaluated solve_and_correct(StepReport& report);
   bool converged(const Evaluated& now, double norm, double h) const;
   bool gains_energy(const State<double>& state, double h);
+  template <class Action>
+  void with_added(const Action& action);
+  void begin_effects(const State<double>& state, int history, double h);
+  void act(Evaluated& now);
+  bool revise_effects(bool settled);
+  double fall(double h) const;
+  const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
   double work(const Field<double>& force) const;
   bool at_rounding_floor(const Evaluated& now, double norm, double h, double epsilons) const;
   Index worst_displacement() const;
@@ -111,6 +128,12 @@ class Stepper {
   double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
   double kinetic_ = 0;          // the same in J
   double failed_residual_ = 0;  // of the last solve that failed
+  std::unique_ptr<EffectSweeps<double>> effects_;  // null: none
+  EffectWork<double> effect_work_, solved_work_;  // of the whole step; of the root found last
+  Field<double> before_;       // displacement of the step before, as far as it is known [rad, m]
+  double effect_potential_ = 0;  // at the beginning of the step [J]
+  double time_ = 0, effect_scale_ = 0;
+  bool guess_points_ = false;  // no evaluation of this solve has been made yet
   std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;

@@ -20,6 +20,19 @@ struct Gains {
   Field<S>& inverse;     // nv x nv blocks
 };
 
+/// What effects add to a factor: nothing, where a scene has none.
+struct NothingAdded {
+  static constexpr bool to_joints = false, to_bodies = false;
+};
+
+/// d grows by a number a row (infinite: the joint is held), the 6 x 6 matrix of a body by another.
+template <class S, bool Joints, bool Bodies>
+struct EffectsAdded {
+  static constexpr bool to_joints = Joints, to_bodies = Bodies;
+  const Field<S>& stiffness;
+  const Field<S, 36>& pull;
+};
+
 /// Values before this line go through memory to those after it. A 6 x 6 matrix and two placements do not fit in 32 registers, and
 /// left to themselves compilers keep all 36 numbers alive and spill them twice over: the factor of a block took 132 ns a body so,
 /// and takes 95 in steps that each fit.
@@ -47,16 +60,18 @@ LINDEN_INLINE Wrench<S> load_column(const S* column) {
 }
 
 /// Takes the joint of body i out of A, 36 numbers stored as a Mat6, and stores its gains. What is left for the parent to feel: of a free
-/// joint nothing, of a ball joint a force alone.
-template <JointKind Kind, class S, class Element>
+/// joint nothing, of a ball joint that moves freely a force alone. Effects act on screws and ball joints.
+template <JointKind Kind, class S, class Element, class Added>
 LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyConstants<Element>& constants, Index i, const S* A,
-                                   const Gains<S>& gains, S* felt) {
+                                   const Gains<S>& gains, S* felt, const Added& added) {
   const Index row = tree.first_v(i), block = tree.first_block(i);
   const S zero(0.0), one(1.0);
   if constexpr (Kind == JointKind::screw) {
     const Screw<S> screw = load_screw<S>(constants, i);
     const Wrench<S> U = screw.r * load_column(A + column_start(2)) + screw.t * load_column(A + column_start(5));
-    const S inverse = one / (screw.r * U.n.z + screw.t * U.f.z);
+    S d = screw.r * U.n.z + screw.t * U.f.z;
+    if constexpr (Added::to_joints) d = d + added.stiffness(row);
+    const S inverse = one / d;
     const Wrench<S> up = inverse * U;
     const Twist<S> W = screw.r * load_row(A + row_start(2)) + screw.t * load_row(A + row_start(5));
     store(gains.up, row, up);
@@ -73,9 +88,27 @@ LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyCons
     const auto M = Mat6<S>::from(A);
     std::array<S, 9> flat;
     M.aa.to(flat.data());
+    if constexpr (Added::to_joints) {
+      for (Index k = 0; k < 3; ++k) {
+        S& d = flat[static_cast<std::size_t>(4 * k)];
+        d = d + added.stiffness(row + k);
+      }
+    }
     invert<3>(flat);
     const auto inverse = Mat3<S>::from(flat.data());
     for (Index k = 0; k < 9; ++k) gains.inverse(block + k) = flat[static_cast<std::size_t>(k)];
+    if constexpr (Added::to_joints) {
+      const Mat3<S> up_n = M.aa * inverse, up_f = M.ba * inverse, down_w = inverse * M.aa, down_v = inverse * M.ab;
+      const Mat3<S> n = transpose(up_n), f = transpose(up_f);
+      store(gains.up, row, Wrench<S>{n.x, f.x});
+      store(gains.up, row + 1, Wrench<S>{n.y, f.y});
+      store(gains.up, row + 2, Wrench<S>{n.z, f.z});
+      store(gains.down, row, Twist<S>{down_w.x, down_v.x});
+      store(gains.down, row + 1, Twist<S>{down_w.y, down_v.y});
+      store(gains.down, row + 2, Twist<S>{down_w.z, down_v.z});
+      Mat6<S>{M.aa - up_n * M.aa, M.ab - up_n * M.ab, M.ba - up_f * M.aa, M.bb - up_f * M.ab}.to(felt);
+      return;
+    }
     const Vec3<S> none{zero, zero, zero};
     const Mat3<S> up = M.ba * inverse, down = inverse * M.ab;
     const Mat3<S> columns = transpose(up);

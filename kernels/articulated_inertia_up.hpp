@@ -15,17 +15,19 @@
 
 namespace linden {
 
-template <class S, class Element, int Room>
+template <class S, class Element, int Room, class Added = NothingAdded>
 void articulated_inertia_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
-                            Field<S, Room>& articulated, const Gains<S>& gains) {
+                            Field<S, Room>& articulated, const Gains<S>& gains, const Added& added = {}) {
   for (Index i = 0; i < tree.shape.slots; ++i) {
     const auto G = load<Inertia, S>(constants.inertia, i);
     const Mat3<S> C = hat(G.mc);
-    Mat6<S>{G.rotational(), C, transpose(C), diagonal(G.m)}.to(articulated.row(i));
+    Mat6<S> A{G.rotational(), C, transpose(C), diagonal(G.m)};
+    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.pull.row(i));
+    A.to(articulated.row(i));
   }
   up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     S felt[36];
-    eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, felt);
+    eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, felt, added);
     if constexpr (joint != JointKind::free) {
       const auto X = load<Placement, S>(placement, i);
       S* const parent = articulated.row(tree.parent(i));

@@ -83,8 +83,8 @@ S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Works
   return innovation_up(tree, constants, all_slots(tree), work);
 }
 
-template <bool FirstOrder, class S, class Element>
-[[gnu::noinline]] S newton_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
+template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
+[[gnu::noinline]] S newton_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work, const Added& added = {}) {
   const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
   clear_world(work.impulse);
   S norm(0.0);
@@ -98,11 +98,12 @@ template <bool FirstOrder, class S, class Element>
       const Twist<S> twist = log(load<Displacement, S>(work.displacement, i));
       A = pose_derivative(G, twist, G * twist);
     }
+    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.pull.row(i));
     if (tree.is_leaf(i) == 0) A = A + Mat6<S>::from(work.articulated.row(i));
     A.to(work.articulated.row(i));
     settle();
     S felt[36];
-    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt);
+    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt, added);
     settle();
 
     const auto X = load<Placement, S>(work.placement, i);

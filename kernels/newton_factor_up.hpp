@@ -49,16 +49,17 @@ inline void pose_derivative_rows(const Tree& tree, const BodyConstants<double>& 
 }
 
 /// What the joint of a body passes to its parent, and its gains. A: Pi by rows, or by columns.
-template <bool ByColumns>
+template <bool ByColumns, class Added>
 LINDEN_INLINE Rows6 pass_screw(const Tree& tree, const BodyConstants<double>& constants, Index i, const Rows6& A, const double* X,
-                               const double* X_pose, const Gains<double>& gains) {
+                               const double* X_pose, const Gains<double>& gains, const Added& added) {
   const double r = constants.screw(i, 0), t = constants.screw(i, 1);
   alignas(kAlignment) double numbers[kRowNumbers];
   for (int k = 0; k < 6; ++k) store_row8(numbers + 8 * k, A.r[k]);
   // along: S^T A by rows, A S by columns; across: the other one, its numbers each in a register
   const Row8 along = r * A.r[2] + t * A.r[5];
-  const Row8 d = r * __builtin_shufflevector(along, along, 2, 2, 2, 2, 2, 2, 2, 2) +
+  Row8 d = r * __builtin_shufflevector(along, along, 2, 2, 2, 2, 2, 2, 2, 2) +
                  t * __builtin_shufflevector(along, along, 5, 5, 5, 5, 5, 5, 5, 5);
+  if constexpr (Added::to_joints) d += spread(added.stiffness(tree.first_v(i)));
   const Row8 inverse = 1.0 / d;
   settle();
   Row8 across[6];
@@ -75,21 +76,22 @@ LINDEN_INLINE Rows6 pass_screw(const Tree& tree, const BodyConstants<double>& co
 }
 
 /// Ball and free joints, number by number.
-template <JointKind Kind>
+template <JointKind Kind, class Added>
 LINDEN_INLINE Rows6 pass_joint(Joint<Kind> joint, const Tree& tree, const BodyConstants<double>& constants, Index i, bool by_columns,
                                const Rows6& A, const Placement<double>& X, const Placement<double>& X_pose,
-                               const Gains<double>& gains) {
+                               const Gains<double>& gains, const Added& added) {
   double numbers[36], felt[36], passed[36];
   to_mat6(by_columns ? turned_over(A) : A, numbers);
-  eliminate_joint(joint, tree, constants, i, numbers, gains, felt);
+  eliminate_joint(joint, tree, constants, i, numbers, gains, felt, added);
   to_parent(X, X_pose, felt, [&](int at, double value) LINDEN_INLINE_LAMBDA { passed[at] = value; });
   const Rows6 rows = rows_of(passed);
   return by_columns ? rows : turned_over(rows);  // the parent is held the other way
 }
 
-inline void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
-                             const Field<double, 7>& motion, const Field<double, 7>& displacement, Slots slots,
-                             Field<double, kRowNumbers>& articulated, const Gains<double>& gains) {
+template <class Added = NothingAdded>
+void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
+                      const Field<double, 7>& motion, const Field<double, 7>& displacement, Slots slots,
+                      Field<double, kRowNumbers>& articulated, const Gains<double>& gains, const Added& added = {}) {
   constexpr Index kTile = 32;  // 12 KiB of K
   alignas(kAlignment) double K[kTile * kRowNumbers];
   Index tile = slots.end;
@@ -107,6 +109,11 @@ inline void newton_factor_up(const Tree& tree, const BodyConstants<double>& cons
     }
     Rows6 A;
     for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + waiting.r[k];
+    if constexpr (Added::to_bodies) {
+      const Rows6 pull = rows_of(added.pull.row(i));
+      const Rows6 turned = tree.level(i) % 2 != 0 ? turned_over(pull) : pull;
+      for (int k = 0; k < 6; ++k) A.r[k] += turned.r[k];
+    }
     const auto X = load<Placement, double>(placement, i);
     const auto X_pose = after_motion(joint, X, load<Displacement, double>(motion, i));
     const bool by_columns = tree.level(i) % 2 != 0;
@@ -114,10 +121,10 @@ inline void newton_factor_up(const Tree& tree, const BodyConstants<double>& cons
     if constexpr (joint == JointKind::screw) {
       double after[12];
       X_pose.to(after);
-      passed = by_columns ? pass_screw<true>(tree, constants, i, A, placement.row(i), after, gains)
-                          : pass_screw<false>(tree, constants, i, A, placement.row(i), after, gains);
+      passed = by_columns ? pass_screw<true>(tree, constants, i, A, placement.row(i), after, gains, added)
+                          : pass_screw<false>(tree, constants, i, A, placement.row(i), after, gains, added);
     } else {
-      passed = pass_joint(joint, tree, constants, i, by_columns, A, X, X_pose, gains);
+      passed = pass_joint(joint, tree, constants, i, by_columns, A, X, X_pose, gains, added);
     }
     // a parent that comes next and has no other child takes it from the registers
     const Index parent = tree.parent(i);
@@ -132,10 +139,11 @@ inline void newton_factor_up(const Tree& tree, const BodyConstants<double>& cons
   });
 }
 
-inline void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
-                             const Field<double, 7>& motion, const Field<double, 7>& displacement,
-                             Field<double, kRowNumbers>& articulated, const Gains<double>& gains) {
-  newton_factor_up(tree, constants, placement, motion, displacement, all_slots(tree), articulated, gains);
+template <class Added = NothingAdded>
+void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
+                      const Field<double, 7>& motion, const Field<double, 7>& displacement,
+                      Field<double, kRowNumbers>& articulated, const Gains<double>& gains, const Added& added = {}) {
+  newton_factor_up(tree, constants, placement, motion, displacement, all_slots(tree), articulated, gains, added);
 }
 
 }  // namespace linden

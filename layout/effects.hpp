@@ -9,6 +9,7 @@
 //   Simulation simulation(model, options, effects);
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <optional>

@@ -31,7 +31,7 @@ template <JointKind Kind>
 Mat6<double> without_joint(Joint<Kind> joint, const Model& model, Index i, const Mat6<double>& A, const Gains<double>& gains) {
   std::array<double, 36> numbers, felt;
   A.to(numbers.data());
-  eliminate_joint(joint, model.tree, model.constants, i, numbers.data(), gains, felt.data());
+  eliminate_joint(joint, model.tree, model.constants, i, numbers.data(), gains, felt.data(), NothingAdded{});
   return Mat6<double>::from(felt.data());
 }
 
@@ -141,7 +141,7 @@ TEST_CASE("eliminating joints writes every gain, allocates nothing and gives equ
                       using S = std::decay_t<decltype(rig.h)>;
                       S felt[36];
                       S* const A = rig.work.articulated.row(i);
-                      eliminate_joint(joint, rig.tree, rig.constants, i, A, rig.gains(), felt);
+                      eliminate_joint(joint, rig.tree, rig.constants, i, A, rig.gains(), felt, NothingAdded{});
                       const auto X = load<Placement, S>(rig.work.placement, i);
                       to_parent(X, X, felt, [&](int at, const S& value) { A[at] = value; });
                     });

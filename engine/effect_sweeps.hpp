@@ -1,0 +1,261 @@
+// engine/effect_sweeps.hpp
+// The effects of a scene within a step: what they keep while it is solved, and when their kernels are called.
+//
+//   begin            tables at the middle of the step's time; states (sticks? at its limit?) as the first guess suggests
+//   +-> bodies       forces on bodies, after their momenta are known                 once an evaluation
+//   |   joints       impulses of joints into the target of the residual              once an evaluation
+//   |   revise       states that belong to the solution so far: did one change?      where some effect has states
+//   +-- until none changes and the residual is small
+//   end              impulses of the end of the step, work of each effect
+//
+// S is double, or a pack of W instances.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "engine/effect_plan.hpp"
+#include "kernels/effects/armature.hpp"
+#include "kernels/effects/ball_spring.hpp"
+#include "kernels/effects/damping.hpp"
+#include "kernels/effects/drag.hpp"
+#include "kernels/effects/friction.hpp"
+#include "kernels/effects/ground.hpp"
+#include "kernels/effects/limits.hpp"
+#include "kernels/effects/servo.hpp"
+#include "kernels/effects/spring.hpp"
+#include "kernels/effects/torque.hpp"
+#include "kernels/effects/wrench.hpp"
+#include "kernels/world_placement_down.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+
+/// What effects gave (driving ones) or took (losses) [J].
+#define LINDEN_EFFECT_WORK(FIELD)     \
+  FIELD(damping, "taken")             \
+  FIELD(friction, "taken")            \
+  FIELD(limits, "taken")              \
+  FIELD(servo, "given")               \
+  FIELD(torque, "given")              \
+  FIELD(wrench, "given")              \
+  FIELD(drag, "taken")                \
+  FIELD(ground, "taken")
+
+template <class S>
+struct EffectWork {
+#define LINDEN_MEMBER(name, sense) S name = S(0.0);
+  LINDEN_EFFECT_WORK(LINDEN_MEMBER)
+#undef LINDEN_MEMBER
+
+  void add(const EffectWork& more) {
+#define LINDEN_ADD(name, sense) name = name + more.name;
+    LINDEN_EFFECT_WORK(LINDEN_ADD)
+#undef LINDEN_ADD
+  }
+  S magnitude() const {
+    using std::abs;
+    S sum(0.0);
+#define LINDEN_MAGNITUDE(name, sense) sum = sum + abs(name);
+    LINDEN_EFFECT_WORK(LINDEN_MAGNITUDE)
+#undef LINDEN_MAGNITUDE
+    return sum;
+  }
+  S given() const { return servo + torque + wrench; }
+  S taken() const { return damping + friction + limits + drag + ground; }
+};
+
+template <class S>
+class EffectSweeps {
+ public:
+  EffectSweeps(const EffectPlan& plan, const Model& model) : plan_(plan), tree_(model.tree) {
+    const Effects& effects = plan.effects;
+    const auto rows = [](Field<S>& field, std::size_t count) { field.allocate(static_cast<Index>(count)); };
+    if (plan.joints) {
+      sum_.allocate(tree_.shape);
+      force_.resize(effects.torques.size());
+      servos_.entries = effects.servos;
+      servos_.share = plan.servo_share;
+      rows(servos_.mode, effects.servos.size());
+      rows(servos_.target, effects.servos.size());
+      for (std::size_t k = 0; k < effects.servos.size(); ++k) servos_.target(static_cast<Index>(k)) = as<S>(effects.servos[k].target);
+      frictions_.entries = effects.friction;
+      rows(frictions_.mode, effects.friction.size());
+      limits_.entries = effects.limits;
+      for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
+    }
+    if (plan.bodies) {
+      bodies_.allocate(tree_.shape);
+      clear_bodies();
+      points_.allocate({.slots = static_cast<Index>(plan.ground.points.size())});
+      drags_.entries = effects.drag;
+      drags_.share = plan.drag_share;
+      drags_.wind = {effects.wind[0], effects.wind[1], effects.wind[2]};
+      rows(drags_.loss, effects.drag.size());
+      wrenches_.entries = effects.wrenches;
+      scale_.resize(effects.wrenches.size());
+      wrenches_.scale = scale_;
+      rows(wrenches_.work, effects.wrenches.size());
+    }
+  }
+  EffectSweeps(const EffectSweeps&) = delete;
+  EffectSweeps& operator=(const EffectSweeps&) = delete;
+
+  const EffectPlan& plan() const { return plan_; }
+  /// What joints are given, and bodies, for the factors.
+  const JointImpulses<S>& joint_sum() const { return sum_; }
+  const BodyImpulses<S>& body_sum() const { return bodies_; }
+  /// Where momentum_target_map leaves the target that effects are taken from.
+  Field<S>& plain_target() { return sum_.plain_target; }
+  Field<S>& servo_targets() { return servos_.target; }
+
+  /// After placements changed. Returns the potential energy of springs and of the ground at q [J].
+  S refresh(const Field<S, 12>& placement, const Field<S>& q) {
+    S potential(0.0);
+    if (plan_.bodies) {
+      world_placement_down(tree_, placement, bodies_.pose);
+      if (!plan_.ground.points.empty()) ground_potential_ = find_ground(plan_.ground, bodies_.pose, points_);
+      potential = potential + ground_potential_;
+    }
+    if (!plan_.effects.springs.empty()) potential = potential + spring_potential(plan_.effects.springs, plan_.q_row, q);
+    if (!plan_.effects.ball_springs.empty()) potential = potential + ball_spring_potential(plan_.effects.ball_springs, tree_, q);
+    return potential;
+  }
+
+  /// delta: the first guess, moved into the limits. past(row, k): displacement k steps before, where two are `known`.
+  template <class Past, class Mask>
+  void begin(double time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
+    h_ = h;
+    q_ = &q;
+    ground_before_ = ground_potential_;
+    if (plan_.bodies) {
+      for (std::size_t k = 0; k < scale_.size(); ++k) {
+        const BodyWrench& wrench = plan_.effects.wrenches[k];
+        scale_[k] = time >= wrench.from && time < wrench.to ? wrench.scale.at(time) : 0;
+      }
+    }
+    if (!plan_.joints) return;
+    for (std::size_t k = 0; k < force_.size(); ++k) force_[k] = plan_.effects.torques[k].force.at(time);
+    std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
+    guess_friction(frictions_, delta);
+    begin_limits(limits_, plan_.q_row, h, q, past, known, delta);
+    assemble();
+  }
+
+  /// Forces on bodies in slots [begin, end): impulse holds h mu.
+  template <class Element>
+  void bodies(Slots slots, const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    auto body = std::ranges::lower_bound(plan_.touched, slots.begin, {}, &TouchedBody::slot);
+    for (; body != plan_.touched.end() && body->slot < slots.end; ++body) {
+      clear_body(bodies_, body->slot);
+      drag_map(drags_, body->drag.first, body->drag.last, constants, h_, displacement, bodies_, impulse);
+      wrench_map(wrenches_, body->wrenches.first, body->wrenches.last, h_, displacement, bodies_, impulse);
+      ground_map(plan_.ground, body->points.first, body->points.last, h_, displacement, points_, bodies_, impulse);
+    }
+  }
+  /// Before the first of them: which points slide, as the first guess has it.
+  void guess_points(const Field<S, 7>& displacement) {
+    guess_ground(plan_.ground, h_, displacement, points_);
+    std::ranges::copy(points_.closed.flat(), points_.factored.flat().begin());
+  }
+
+  /// The target of the residual at delta.
+  void joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& target) const {
+    joint_impulses_map(sum_, delta, target);
+    if (!plan_.effects.ball_springs.empty()) ball_spring_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, target);
+  }
+
+  /// States that belong to the solution so far. `settled`: the residual is small, so that impulses that hold can be judged. delta is
+  /// changed where a joint comes to rest. Returns in which instances something changed: the factor is out of date there.
+  template <class Mask>
+  auto revise(const Field<S>& residual, const Mask& settled, Field<S>& delta) {
+    auto changed = S(0.0) > S(1.0);
+    if (plan_.joints) {
+      changed = revise_servos(servos_, plan_.q_row, h_, *q_, delta);
+      changed = revise_friction(frictions_, h_, residual, settled, delta) || changed;
+      changed = revise_limits(limits_, residual, settled, delta) || changed;
+      if (any(changed)) assemble();
+    }
+    if (!plan_.ground.points.empty()) changed = revise_ground(points_, settled) || changed;
+    return changed;
+  }
+
+  /// Impulses of the beginning become those of the end, but for being seen from the new poses.
+  void end_bodies(const Field<S, 12>& placement, Field<S, 6>& impulse) {
+    add_given_up(tree_, placement, bodies_.given, impulse);
+    keep_ground(points_);
+  }
+
+  /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
+  void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) const {
+    joint_impulses_end_map(sum_, h_, delta, end);
+    if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
+    const S most = as<S>(std::numeric_limits<double>::max());
+    const auto release = [&](Index row) { residual(row) = select(sum_.stiffness(row) > most, S(0.0), residual(row)); };
+    for (const JointFriction& friction : frictions_.entries) release(friction.row);
+    for (const JointLimit& limit : limits_.entries) release(limit.row);
+  }
+
+  /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
+  /// last step; `known`: it was one of these sweeps.
+  EffectWork<S> work(const Field<S>& residual, const Field<S>& delta, const Field<S>& before, bool known) const {
+    EffectWork<S> work;
+    if (plan_.joints) {
+      work.damping = damping_loss(plan_.effects.damping, plan_.damping_share, h_, delta, before);
+      work.friction = friction_loss(frictions_, h_, residual, delta, before);
+      work.limits = limit_loss(limits_, h_, residual, delta, before);
+      work.servo = servo_work(servos_, plan_.q_row, h_, *q_, delta, before);
+      work.torque = torque_work(plan_.effects.torques, force_, delta);
+    }
+    if (plan_.bodies) {
+      for (Index k = 0; k < drags_.loss.rows(); ++k) work.drag = work.drag + drags_.loss(k);
+      for (Index k = 0; k < wrenches_.work.rows(); ++k) work.wrench = work.wrench + wrenches_.work(k);
+      work.ground = -ground_work(plan_.ground, known, points_);
+    }
+    return work;
+  }
+  /// Magnitudes of the work of all effects in that step, springs included [J].
+  S activity(const EffectWork<S>& work, const Field<S, 7>& motion, const Field<S>& delta) const {
+    using std::abs;
+    return work.magnitude() + abs(spring_work(plan_.effects.springs, plan_.q_row, *q_, delta)) +
+           abs(ball_spring_work(plan_.effects.ball_springs, tree_, *q_, motion, delta));
+  }
+  /// Taken from work().ground once the potential at the end is known.
+  S ground_stored() const { return ground_potential_ - ground_before_; }
+
+ private:
+  /// sum_ from all effects in their states.
+  void assemble() {
+    clear(sum_);
+    const Effects& effects = plan_.effects;
+    armature_map(effects.armature, sum_);
+    spring_map(effects.springs, plan_.q_row, h_, *q_, sum_);
+    ball_spring_stiffness(effects.ball_springs, tree_, h_, sum_);
+    damping_map(effects.damping, plan_.damping_share, h_, sum_);
+    torque_map(effects.torques, force_, h_, sum_);
+    servo_map(servos_, plan_.q_row, h_, *q_, sum_);
+    friction_map(frictions_, h_, sum_);
+    hold_friction(frictions_, sum_);
+    hold_limits(limits_, sum_);
+  }
+  void clear_bodies() {
+    for (Index i = 0; i < tree_.shape.slots; ++i) clear_body(bodies_, i);
+  }
+
+  const EffectPlan& plan_;
+  const Tree& tree_;
+  S h_{};
+  const Field<S>* q_ = nullptr;
+  JointImpulses<S> sum_;
+  Servos<S> servos_;
+  Frictions<S> frictions_;
+  Limits<S> limits_;
+  std::vector<double> force_, scale_;
+  BodyImpulses<S> bodies_;
+  GroundPoints<S> points_;
+  Drags<S> drags_;
+  Wrenches<S> wrenches_;
+  S ground_potential_ = S(0.0), ground_before_ = S(0.0);
+};
+
+}  // namespace linden

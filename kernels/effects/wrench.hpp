@@ -1,0 +1,60 @@
+// kernels/effects/wrench.hpp
+// Forces and moments on bodies that are given over time.
+//
+//   in the world's frame   the same direction at both ends of the step
+//   in the body's frame    turns with the body
+//
+// at the middle of the step's time, share 1/2. F acts at the body's point a.
+//
+// units   [N], [N m]
+// energy  gives F.D + moment . turn a step
+// cost    some 120 operations an entry and evaluation, one product of rotations a body and step
+#pragma once
+
+#include <span>
+
+#include "kernels/effects/body_impulses.hpp"
+#include "layout/effects.hpp"
+
+namespace linden {
+
+template <class S>
+struct Wrenches {
+  std::span<const BodyWrench> entries;
+  std::span<const double> scale;  // of each in this step; zero outside its time
+  Field<S> work;                  // of each in the evaluation last made [J]
+};
+
+/// Entries first ... last - 1, sorted by slot.
+template <class S>
+void wrench_map(Wrenches<S>& wrenches, std::size_t first, std::size_t last, const S& h, const Field<S, 7>& displacement,
+                BodyImpulses<S>& sum, Field<S, 6>& impulse) {
+  const S half(0.5), scale = h * h;
+  const auto vector = [](const std::array<double, 3>& from, double times) {
+    return Vec3<S>{as<S>(times * from[0]), as<S>(times * from[1]), as<S>(times * from[2])};
+  };
+  for (std::size_t k = first; k < last; ++k) {
+    const BodyWrench& wrench = wrenches.entries[k];
+    const Index i = wrench.slot;
+    const Vec3<S> a = vector(wrench.point, 1);
+    const auto D = load<Displacement, S>(displacement, i);
+    const Vec3<S> moved = point_displacement(D, a), turn = log(D).w;
+    Vec3<S> force = vector(wrench.force, wrenches.scale[k]), moment = vector(wrench.moment, wrenches.scale[k]);
+    Vec3<S> end_force = force, end_moment = moment;  // in the body frame at k as well
+    if (wrench.in_world) {
+      const auto R = load<Placement, S>(sum.pose, i).R;
+      end_force = force = transpose_times(R, force);
+      end_moment = moment = transpose_times(R, moment);
+    } else {
+      end_force = rotate(D.r, force);
+      end_moment = rotate(D.r, moment);
+    }
+    const Wrench<S> begin{half * (moment + cross(a, force)), half * force};
+    const Wrench<S> end{half * (end_moment + cross(a + moved, end_force)), half * end_force};
+    store(impulse, i, load<Wrench, S>(impulse, i) - scale * begin);
+    store(sum.given, i, load<Wrench, S>(sum.given, i) + scale * (begin + end));
+    wrenches.work(static_cast<Index>(k)) = half * (dot(force + end_force, moved) + dot(moment + end_moment, turn));
+  }
+}
+
+}  // namespace linden

@@ -1,0 +1,385 @@
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <numbers>
+
+#include "models/generators.hpp"
+#include "scenes.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kG = 9.81;
+
+/// One body of the given mass and inertia on a joint along or about z, its centre of mass at `center`.
+Model one_joint(JointType type, double mass, double inertia, const Eigen::Vector3d& center = Eigen::Vector3d::Zero(),
+                const Eigen::Vector3d& axis = Eigen::Vector3d::UnitZ()) {
+  LinkSpec link;
+  link.name = "link";
+  link.joint = "joint";
+  link.type = type;
+  link.axis = axis;
+  link.inertia = {mass, center, inertia * Eigen::Matrix3d::Identity()};
+  return TreeBuilder("one joint").add(link).build();
+}
+Model rotor(double inertia = 0.02) { return one_joint(JointType::revolute, 1, inertia); }
+Model slider(double mass = 2) { return one_joint(JointType::prismatic, mass, 0.01); }
+Model body(double mass = 2, double inertia = 0.01) { return one_joint(JointType::free, mass, inertia); }
+
+Options still(double step = 1e-3) { return {.step = step, .gravity = {0, 0, 0}}; }
+
+void set(Simulation& simulation, std::vector<double> q, std::vector<double> v) {
+  simulation.set_positions(q);
+  simulation.set_velocities(v);
+}
+
+/// Position after `duration` seconds.
+double after(Simulation simulation, double duration) {
+  run(simulation, static_cast<int>(std::lround(duration / simulation.options().step)));
+  return simulation.positions()[0];
+}
+
+/// Of a x'' + c x' + k x = 0 from x = x0 at rest.
+double oscillator(double a, double c, double k, double x0, double t) {
+  const double decay = c / (2 * a), square = k / a - decay * decay;
+  if (std::abs(square) < 1e-9 * decay * decay) return x0 * std::exp(-decay * t) * (1 + decay * t);
+  const double w = std::sqrt(std::abs(square));
+  if (square > 0) return x0 * std::exp(-decay * t) * (std::cos(w * t) + decay / w * std::sin(w * t));
+  return x0 * std::exp(-decay * t) * (std::cosh(w * t) + decay / w * std::sinh(w * t));
+}
+
+/// Energy plus what effects took less what they gave.
+double balance(Simulation& simulation) {
+  return simulation.energy().total() + simulation.effect_work().taken() - simulation.effect_work().given();
+}
+
+}  // namespace
+
+TEST_CASE("a damped oscillator follows its closed form, whatever its damping, to second order", "[effects]") {
+  const double a = 0.02, k = 3, x0 = 0.4, critical = 2 * std::sqrt(a * k);
+  for (const double c : {0.1 * critical, critical, 3 * critical}) {
+    Effects effects;
+    effects.springs = {{.row = 0, .stiffness = k, .rest = 0.1}};
+    effects.damping = {{.row = 0, .coefficient = c}};
+    double error[2];
+    for (int halving = 0; halving < 2; ++halving) {
+      Simulation simulation(rotor(a), still(1e-3 / (1 + halving)), effects);
+      set(simulation, {0.1 + x0}, {0});
+      error[halving] = std::abs(after(std::move(simulation), 0.7) - 0.1 - oscillator(a, c, k, x0, 0.7));
+    }
+    INFO("damping " << c << ": errors " << error[0] << ", " << error[1]);
+    CHECK(error[0] < 1e-4 * x0);
+    CHECK(error[0] / error[1] == Approx(4).epsilon(0.1));
+  }
+}
+
+TEST_CASE("a rotor's inertia acts as if the link had it", "[effects]") {
+  const Eigen::Vector3d center(0.3, 0, 0);
+  LinkSpec link;
+  link.name = "link";
+  link.joint = "joint";
+  link.axis = Eigen::Vector3d::UnitY();
+  link.inertia = {1, center, 0.01 * Eigen::Matrix3d::Identity()};
+  const Model bare = TreeBuilder("pendulum").add(link).build();
+  link.inertia.about_center(1, 1) += 0.05;
+  const Model heavy = TreeBuilder("pendulum").add(link).build();
+  Effects effects;
+  effects.armature = {{.row = 0, .inertia = 0.05}};
+  Simulation one(bare, {}, effects), other(heavy, {});
+  set(one, {0.3}, {1});
+  set(other, {0.3}, {1});
+  CHECK(one.momenta()[0] == Approx(other.momenta()[0]).epsilon(1e-14));
+  run(one, 1000);
+  run(other, 1000);
+  CHECK(one.positions()[0] == Approx(other.positions()[0]).margin(1e-11));
+  CHECK(one.energy().total() == Approx(other.energy().total()).margin(1e-11));
+  CHECK(one.velocities()[0] == Approx(other.velocities()[0]).margin(1e-10));
+}
+
+TEST_CASE("a spring sags by weight over stiffness", "[effects]") {
+  Effects effects;
+  effects.springs = {{.row = 0, .stiffness = 500}};
+  effects.damping = {{.row = 0, .coefficient = 40}};
+  CHECK(after(Simulation(slider(2), {}, effects), 3) == Approx(-2 * kG / 500).epsilon(1e-9));
+}
+
+TEST_CASE("a ball joint's spring swings as slowly as its stiffness says, keeps energy and its turn about the axis of a symmetric body",
+          "[effects]") {
+  const Model model = one_joint(JointType::ball, 1, 0.02);
+  Effects effects;
+  const double half = 0.5 * 0.3;
+  effects.ball_springs = {{.slot = 1, .stiffness = 3, .rest = {std::sin(half), 0, 0, std::cos(half)}}};
+  // a sphere about one axis: an oscillator, at any amplitude
+  Simulation simulation(model, still(), effects);
+  set(simulation, {std::sin(half + 0.4), 0, 0, std::cos(half + 0.4)}, {0, 0, 0});
+  const double before = simulation.energy().total();
+  run(simulation, 700);
+  const double angle = 2 * std::atan2(simulation.positions()[0], simulation.positions()[3]) - 0.3;
+  CHECK(angle == Approx(oscillator(0.02, 0, 3, 0.8, 0.7)).margin(1e-4));
+  CHECK(simulation.energy().total() == Approx(before).epsilon(1e-9));
+  // tumbling about another axis: conserved along every axis of space is the energy alone
+  effects.ball_springs[0].stiffness = 30;
+  Simulation tumbling(model, still(), effects);
+  set(tumbling, {0.1, 0.2, -0.1, 0.9}, {3, -2, 5});
+  const double start = tumbling.energy().total();
+  double band = 0;
+  for (int k = 0; k < 20000; ++k) {
+    run(tumbling, 1);
+    band = std::max(band, std::abs(tumbling.energy().total() - start));
+  }
+  CHECK(band < 1e-4 * start);
+}
+
+TEST_CASE("a servo steps as the oscillator it is, and with too little force at constant acceleration first", "[effects]") {
+  const double a = 0.02, k = 3, c = 0.2;
+  Effects effects;
+  effects.servos = {{.row = 0, .stiffness = k, .damping = c, .target = 0.5}};
+  Simulation free(rotor(a), still(), effects);
+  CHECK(after(std::move(free), 0.4) == Approx(0.5 + oscillator(a, c, k, -0.5, 0.4)).margin(2e-5));
+  effects.servos[0].max_force = 0.4;
+  Simulation limited(rotor(a), still(), effects);
+  CHECK(after(std::move(limited), 0.1) == Approx(0.5 * 0.4 / a * 0.01).epsilon(0.02));
+  Simulation arrived(rotor(a), still(), effects);
+  CHECK(after(std::move(arrived), 5) == Approx(0.5).margin(1e-9));
+}
+
+TEST_CASE("a joint below its break-away force does not creep, above it slides as Coulomb says", "[effects]") {
+  const double mass = 2, f = 5;
+  Effects effects;
+  effects.friction = {{.row = 0, .force = f}};
+  effects.torques = {{.row = 0, .force = {{0}, {0.999 * f}}}};
+  Simulation holding(slider(mass), still(), effects);
+  run(holding, 5000);
+  CHECK(holding.positions()[0] == 0);
+  effects.torques[0].force = {{0, 10}, {0, 2 * f}};
+  Simulation rising(slider(mass), still(), effects);
+  run(rising, 4990);
+  CHECK(rising.positions()[0] == 0);
+  run(rising, 20);
+  CHECK(rising.positions()[0] > 0);
+  run(rising, 990);
+  // from t = 5 on the force in excess rises by f / 5 a second
+  CHECK(rising.positions()[0] == Approx(f / 5 / mass / 6).epsilon(0.02));
+  effects.torques.clear();
+  for (const double speed : {0.7, -0.7}) {
+    Simulation sliding(slider(mass), still(), effects);
+    set(sliding, {0}, {speed});
+    run(sliding, 1000);
+    const double stopped = sliding.positions()[0];
+    CHECK(stopped == Approx(speed * std::abs(speed) / (2 * f / mass)).epsilon(0.01));
+    CHECK(sliding.effect_work().friction == Approx(0.5 * mass * speed * speed).epsilon(1e-3));
+    run(sliding, 100);
+    CHECK(sliding.positions()[0] == stopped);
+  }
+}
+
+TEST_CASE("a joint stops at its limit, or bounces with its restitution, and never gains energy", "[effects]") {
+  for (const double e : {0.0, 0.5, 0.9, 1.0}) {
+    Effects effects;
+    effects.limits = {{.row = 0, .lower = -0.2, .upper = 1, .restitution = e}};
+    Simulation falling(slider(2), {}, effects);
+    double most = 0, least = 0, rebound = -1;
+    bool met = false;
+    for (int k = 0; k < 1500; ++k) {
+      run(falling, 1);
+      most = std::max(most, falling.energy().total());
+      const double q = falling.positions()[0];
+      least = std::min(least, q);
+      met = met || q <= -0.2 + 1e-12;
+      if (met && falling.time() < 0.5) rebound = std::max(rebound, q);
+    }
+    INFO("restitution " << e);
+    CHECK(most < 1e-9);
+    CHECK(least >= -0.2 - 1e-12);
+    CHECK(rebound == Approx(-0.2 + 0.2 * e * e).margin(0.006));
+    if (e == 0) {
+      CHECK(falling.positions()[0] == Approx(-0.2).margin(1e-12));
+      CHECK(balance(falling) == Approx(0).margin(0.05));
+    }
+  }
+}
+
+TEST_CASE("a joint that rests on its limit leaves it when it is pulled away", "[effects]") {
+  Effects effects;
+  effects.limits = {{.row = 0, .lower = -0.1}};
+  effects.torques = {{.row = 0, .force = {{0, 0.999, 1, 2}, {0, 0, 40, 40}}}};
+  Simulation simulation(slider(2), {}, effects);
+  run(simulation, 990);
+  CHECK(simulation.positions()[0] == Approx(-0.1).margin(1e-12));
+  run(simulation, 510);
+  CHECK(simulation.positions()[0] == Approx(-0.1 + 0.5 * (20 - kG) * 0.25).epsilon(0.01));
+}
+
+TEST_CASE("a falling body reaches its terminal velocity along tanh, wind carries it along", "[effects]") {
+  const double mass = 2, b = 0.3, terminal = std::sqrt(mass * kG / b);
+  Effects effects;
+  effects.drag = {{.slot = 1, .quadratic = b}};
+  Simulation falling(body(mass), {}, effects);
+  run(falling, 1000);
+  CHECK(falling.velocities()[5] == Approx(-terminal * std::tanh(kG / terminal)).epsilon(1e-5));
+  run(falling, 9000);
+  CHECK(falling.velocities()[5] == Approx(-terminal).epsilon(1e-5));
+  CHECK(balance(falling) == Approx(0).margin(1e-3));
+  effects.drag = {{.slot = 1, .linear = 3}};
+  effects.wind = {4, -1, 0};
+  Simulation blown(body(mass), still(), effects);
+  run(blown, 2000);
+  const double share = 1 - std::exp(-3 / mass * 2);
+  CHECK(blown.velocities()[3] == Approx(4 * share).epsilon(1e-5));
+  CHECK(blown.velocities()[4] == Approx(-share).epsilon(1e-5));
+}
+
+TEST_CASE("a wrench accelerates as its force over the mass, in the world's or in the body's directions", "[effects]") {
+  Effects effects;
+  effects.wrenches = {{.slot = 1, .force = {4, 0, 0}, .from = 0.5, .to = 1.0}};
+  Simulation pushed(body(2), still(), effects);
+  set(pushed, {0, 0, 0, 0, 0, 0, 1}, {0, 0, 2, 0, 0, 0});
+  run(pushed, 1000);
+  CHECK(pushed.momentum().linear[0] == Approx(4 * 0.5).epsilon(1e-9));
+  CHECK(pushed.positions()[0] == Approx(0.5 * 2 * 0.25).epsilon(1e-6));
+  effects.wrenches = {{.slot = 1, .force = {4, 0, 0}, .in_world = false}};
+  Simulation turning(body(2), still(), effects);
+  set(turning, {0, 0, 0, 0, 0, 0, 1}, {0, 0, 2, 0, 0, 0});
+  run(turning, 1000);
+  CHECK(turning.momentum().linear[0] == Approx(4 * std::sin(2.0) / 2).epsilon(5e-5));
+  CHECK(turning.momentum().linear[1] == Approx(4 * (1 - std::cos(2.0)) / 2).epsilon(5e-5));
+  effects.wrenches = {{.slot = 1, .point = {0, 0.1, 0}, .force = {4, 0, 0}, .moment = {0, 0, 0.4}, .in_world = false}};
+  Simulation balanced(body(2), still(), effects);
+  run(balanced, 500);
+  CHECK(balanced.velocities()[2] == Approx(0).margin(1e-12));
+  CHECK(balanced.velocities()[3] == Approx(1).epsilon(1e-9));
+}
+
+/// A ball of 1 kg, or a box of 2 kg and 0.2 x 0.2 x 0.1 m, on a floating joint.
+Effects ball_on_ground(double radius) {
+  Effects effects;
+  effects.ground = Ground{.stiffness = 2e4, .damping = 0, .friction = 0.5};
+  effects.ground->contacts.spheres = {{.slot = 1, .center = {0, 0, 0}, .radius = radius}};
+  return effects;
+}
+Model box() {
+  LinkSpec link;
+  link.name = "box";
+  link.joint = "base";
+  link.type = JointType::free;
+  link.inertia = box_inertia(2, {0.2, 0.2, 0.1}, Eigen::Vector3d::Zero());
+  return TreeBuilder("box").add(link).build();
+}
+Effects box_on_ground(const std::array<double, 3>& normal, double friction) {
+  Effects effects;
+  effects.ground = Ground{.normal = normal, .stiffness = 2e5, .damping = 200, .friction = friction};
+  for (const double x : {-0.1, 0.1}) {
+    for (const double y : {-0.1, 0.1}) {
+      for (const double z : {-0.05, 0.05}) effects.ground->contacts.spheres.push_back({.slot = 1, .center = {x, y, z}, .radius = 0});
+    }
+  }
+  return effects;
+}
+
+/// Speed with which a body leaves a spring and damper that only push, by RK4 at a thousandth of the contact's time.
+double rebound_speed(double mass, double k, double c, double speed) {
+  const auto force = [&](double x, double v) { return std::max(0.0, -k * x - c * v) / mass - kG; };
+  double x = 0, v = -speed;
+  const double h = 1e-3 * std::sqrt(mass / k);
+  while (x < 0 || v < 0) {
+    const double a1 = force(x, v), v2 = v + h / 2 * a1, a2 = force(x + h / 2 * v, v2), v3 = v + h / 2 * a2;
+    const double a3 = force(x + h / 2 * v2, v3), v4 = v + h * a3, a4 = force(x + h * v3, v4);
+    x += h / 6 * (v + 2 * v2 + 2 * v3 + v4);
+    v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+  }
+  return v;
+}
+
+TEST_CASE("a ball bounces back to where it fell from on elastic ground, and as high as its damping says on lossy ground", "[effects]") {
+  const double mass = 1, k = 2e4, fall = 0.5;
+  for (const double zeta : {0.0, 0.1, 0.4}) {
+    Effects effects = ball_on_ground(0.1);
+    effects.ground->damping = 2 * zeta * std::sqrt(k * mass);
+    Simulation simulation(one_joint(JointType::free, mass, 0.004), {.step = 2e-4}, effects);
+    set(simulation, {0, 0, 0.1 + fall, 0, 0, 0, 1}, std::vector<double>(6, 0.0));
+    const double start = simulation.energy().total();
+    double rebound = 0, most = -1e9;
+    bool met = false;
+    for (int step = 0; step < 4000; ++step) {
+      run(simulation, 1);
+      met = met || simulation.positions()[2] < 0.1;
+      if (met) rebound = std::max(rebound, simulation.positions()[2] - 0.1);
+      most = std::max(most, simulation.energy().total());
+    }
+    const double e = rebound_speed(mass, k, effects.ground->damping, std::sqrt(2 * kG * fall)) / std::sqrt(2 * kG * fall);
+    INFO("damping ratio " << zeta << ", e " << e);
+    CHECK(most < start + 1e-6);
+    if (zeta == 0) {
+      CHECK(rebound == Approx(fall).epsilon(1e-3));
+      CHECK(simulation.energy().total() == Approx(start).epsilon(1e-7));
+    } else {
+      CHECK(rebound == Approx(fall * e * e).epsilon(0.01));
+    }
+    CHECK(balance(simulation) == Approx(start).epsilon(1e-4));
+  }
+}
+
+TEST_CASE("a block holds on a slope below its angle of friction and slides above it as Coulomb says", "[effects]") {
+  const double friction = 0.6, angle_of_friction = std::atan(friction);
+  for (const double share : {0.9, 1.1}) {
+    const double angle = share * angle_of_friction;
+    const std::array<double, 3> normal{std::sin(angle), 0, std::cos(angle)};
+    Simulation simulation(box(), {}, box_on_ground(normal, friction));
+    const double sag = 2 * kG * std::cos(angle) / (4 * 2e5), height = 0.05 - sag;
+    set(simulation, {height * normal[0], 0, height * normal[2], 0, std::sin(angle / 2), 0, std::cos(angle / 2)}, std::vector<double>(6, 0.0));
+    run(simulation, 1000);
+    const double along = simulation.positions()[0] * std::cos(angle) - simulation.positions()[2] * std::sin(angle);
+    INFO("slope of " << share << " of the angle of friction");
+    if (share < 1) {
+      CHECK(std::abs(along) < 1e-5);
+      const double before = along;
+      run(simulation, 10000);
+      const double later = simulation.positions()[0] * std::cos(angle) - simulation.positions()[2] * std::sin(angle);
+      CHECK(std::abs(later - before) < 1.1e-5);
+    } else {
+      CHECK(along == Approx(0.5 * kG * (std::sin(angle) - friction * std::cos(angle))).epsilon(0.01));
+    }
+  }
+}
+
+TEST_CASE("a rolling ball rolls on at five sevenths of the speed it slid in with", "[effects]") {
+  Simulation simulation(one_joint(JointType::free, 1, 0.4 * 0.01), {}, ball_on_ground(0.1));
+  set(simulation, {0, 0, 0.1 - kG / 2e4, 0, 0, 0, 1}, {0, 0, 0, 2, 0, 0});
+  run(simulation, 2000);
+  CHECK(simulation.momentum().linear[0] == Approx(2 * 5.0 / 7).epsilon(0.01));
+}
+
+TEST_CASE("nothing stiff blows up or gains energy, with steps far beyond its time constant", "[effects]") {
+  const double inertia = 1e-3 * 0.1 * 0.1;
+  for (const double h : {1e-3, 1e-2}) {
+    for (const char* const kind : {"spring", "damper", "servo", "servo without damping", "ball spring", "all"}) {
+      const std::string what = kind;
+      const bool ball = what == "ball spring";
+      Effects effects;
+      if (what == "spring" || what == "all") effects.springs = {{.row = 0, .stiffness = 1e9}};
+      if (what == "damper" || what == "all") effects.damping = {{.row = 0, .coefficient = 1e9}};
+      if (what == "servo" || what == "all") effects.servos = {{.row = 0, .stiffness = 1e7, .damping = 1e7}};
+      if (what == "servo without damping") effects.servos = {{.row = 0, .stiffness = 1e7}};
+      if (ball) effects.ball_springs = {{.slot = 1, .stiffness = 1e9}};
+      if (what == "all") effects.friction = {{.row = 0, .force = 1e-3}};
+      const Model model = one_joint(ball ? JointType::ball : JointType::revolute, 1e-3, inertia, {0.1, 0, 0}, Eigen::Vector3d::UnitY());
+      Simulation simulation(model, {.step = h}, effects);
+      if (ball) {
+        simulation.set_velocities(std::vector<double>{0.3, 1, -0.5});
+      } else {
+        simulation.set_velocities(std::vector<double>{1});
+      }
+      const double start = simulation.energy().total();
+      double most = start;
+      INFO(what << " at " << h << " s");
+      for (int k = 0; k < 2000; ++k) {
+        run(simulation, 1);
+        most = std::max(most, simulation.energy().total());
+      }
+      CHECK(most <= start * (1 + 1e-6) + 1e-9);
+      if (!ball) CHECK(std::abs(simulation.positions()[0]) < 1e-2);
+    }
+  }
+}
+
+}  // namespace linden
