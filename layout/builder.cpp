@@ -8,6 +8,8 @@
 #include <numeric>
 #include <unordered_set>
 
+#include "layout/origin_inertia.hpp"
+
 namespace linden {
 namespace {
 
@@ -23,45 +25,6 @@ constexpr double kTriangleSlack = 1e-9;
 
 /// A joint is taken to move nothing when the inertia it feels is below this share of what its subtree could have.
 constexpr double kMovesNothing = 1e-14;
-
-/// Mass, first moment and inertia about the frame's origin: sums of these are exact, unlike sums about moving centres.
-struct OriginInertia {
-  double mass = 0;
-  Vector3d moment = Vector3d::Zero();
-  Matrix3d about_origin = Matrix3d::Zero();
-
-  OriginInertia() = default;
-  /// `frame`: pose of the link's frame in the frame wanted.
-  OriginInertia(const LinkInertia& link, const Isometry3d& frame) : mass(link.mass) {
-    const Vector3d center = frame * link.center;
-    moment = mass * center;
-    about_origin = frame.linear() * link.about_center * frame.linear().transpose() + parallel_axis(mass, center);
-    about_origin = (0.5 * (about_origin + about_origin.transpose())).eval();
-  }
-
-  OriginInertia& operator+=(const OriginInertia& other) {
-    mass += other.mass;
-    moment += other.moment;
-    about_origin += other.about_origin;
-    return *this;
-  }
-
-  /// The same matter seen from a frame in which this one has pose `frame`.
-  OriginInertia seen_from(const Isometry3d& frame) const {
-    OriginInertia result;
-    const Vector3d turned = frame.linear() * moment;
-    const Vector3d p = frame.translation();
-    result.mass = mass;
-    result.moment = turned + mass * p;
-    result.about_origin = frame.linear() * about_origin * frame.linear().transpose() + parallel_axis(mass, p) +
-                          2 * p.dot(turned) * Matrix3d::Identity() - p * turned.transpose() - turned * p.transpose();
-    return result;
-  }
-
-  static Matrix3d parallel_axis(double mass, const Vector3d& c) {
-    return mass * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
-  }
-};
 
 /// A moving body before sorting: parents are indices into the same list, -1 the world.
 struct Body {
@@ -99,6 +62,7 @@ class Build {
         const std::vector<std::string>& warnings)
       : source_(source.empty() ? name : source), links_(links), carrier_(links.size()) {
     model_.names.model = name;
+    model_.source = source;
     model_.warnings = warnings;
   }
 
@@ -108,11 +72,13 @@ class Build {
     for (const std::size_t link : order_) {
       check_numbers(links_[link]);
       check_inertia(links_[link]);
+      check_shapes(links_[link]);
       place(link);
     }
     if (bodies_.empty()) fail("nothing moves: every joint is fixed; at least one moving joint is needed");
     sort_bodies();
     lay_out();
+    collect_shapes();
     check_coordinate_names();
     check_moved_inertia();
     resolve_mimics();
@@ -205,6 +171,18 @@ class Build {
           "link \"{}\": no solid body has this inertia ({}): the largest moment exceeds the sum of the others by {:.2g} of itself; "
           "used as it is",
           link.name, principal, excess));
+    }
+  }
+
+  void check_shapes(const LinkSpec& link) const {
+    for (const LinkShape& shape : link.shapes) {
+      const bool mirrors = shape.shape.kind == ShapeKind::mesh;
+      for (const double size : shape.shape.size) {
+        if (!std::isfinite(size) || (size < 0 && !mirrors) || !shape.pose.matrix().allFinite()) {
+          fail(fmt::format("link \"{}\": a collision shape has a negative size, or a size or pose that is not finite",
+                           link.name));
+        }
+      }
     }
   }
 
@@ -335,6 +313,18 @@ class Build {
       names.link[links_[link].name] = {slot_of(carrier_[link].body), carrier_[link].pose};
       if (links_[link].type != JointType::fixed) names.slot_of_joint[links_[link].joint] = slot_of(carrier_[link].body);
     }
+  }
+
+  void collect_shapes() {
+    for (std::size_t link = 0; link < links_.size(); ++link) {
+      const Index slot = slot_of(carrier_[link].body);
+      if (slot == 0) continue;
+      for (const LinkShape& shape : links_[link].shapes) {
+        model_.shapes.push_back({slot, links_[link].name, Pose(carrier_[link].pose * shape.pose), shape.shape});
+      }
+    }
+    std::stable_sort(model_.shapes.begin(), model_.shapes.end(),
+                     [](const BodyShape& a, const BodyShape& b) { return a.slot < b.slot; });
   }
 
   void name_coordinates(const Body& body) {
@@ -469,6 +459,10 @@ LinkInertia box_inertia(double mass, const Vector3d& size, const Vector3d& cente
 
 LinkInertia sphere_inertia(double mass, double radius, const Vector3d& center) {
   return {mass, center, 0.4 * mass * radius * radius * Matrix3d::Identity()};
+}
+
+LinkShape box_shape(const Vector3d& size, const Vector3d& center) {
+  return {Pose(Eigen::Translation3d(center)), {ShapeKind::box, {size.x(), size.y(), size.z()}, ""}};
 }
 
 TreeBuilder& TreeBuilder::source(std::string source) {

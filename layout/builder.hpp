@@ -7,6 +7,7 @@
 //   any axis                                        body frame turned so that the axis is z
 //   mimic                                           linear map of one coordinate
 //   several roots                                   several trees in one system
+//   collision shapes                                placed in the body's frame; those of links fixed to the world left out
 //
 // Inertias are checked for physical sense; near misses from rounding in real files warn. No recursion: depth is bounded by
 // memory only (100,000-link chains are built in tests).
@@ -22,6 +23,7 @@
 
 #include "layout/input_error.hpp"
 #include "layout/model.hpp"
+#include "layout/shapes.hpp"
 
 namespace linden {
 
@@ -36,6 +38,9 @@ struct LinkInertia {
 
 LinkInertia box_inertia(double mass, const Eigen::Vector3d& size, const Eigen::Vector3d& center);
 LinkInertia sphere_inertia(double mass, double radius, const Eigen::Vector3d& center);
+
+/// The collision shape that goes with box_inertia.
+LinkShape box_shape(const Eigen::Vector3d& size, const Eigen::Vector3d& center);
 
 struct JointLimits {
   double lower = -std::numeric_limits<double>::infinity();
@@ -54,6 +59,7 @@ struct LinkSpec {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  // in the joint frame; normal of the plane for planar joints
   double pitch = 0;  // [m/rad], helical only
   LinkInertia inertia;
+  std::vector<LinkShape> shapes;
   JointLimits limits;
   double damping = 0, friction = 0;
   std::string mimic;  // joint that this one follows; empty = none
@@ -69,8 +75,8 @@ class TreeBuilder {
   TreeBuilder& add(LinkSpec link);
   TreeBuilder& warn(std::string message);
 
-  /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a joint that moves no mass, a mimic
-  /// of a joint that does not exist or is no screw.
+  /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a shape of negative size, a
+  /// joint that moves no mass, a mimic of a joint that does not exist or is no screw.
   Model build() const;
 
  private:

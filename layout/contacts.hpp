@@ -8,10 +8,14 @@
 //   cylinder                                one at each end
 //   mesh       the corners of its bounding box
 //
+// What coincides where a size is 0 is in here once. Files of meshes are read for this and nothing else: layout/mesh_path.hpp
+// finds them, layout/mesh_box.hpp reads them.
+//
 // All in the frame of the body that carries the link (slot 0: fixed to the world, never in here).
 #pragma once
 
 #include <array>
+#include <string>
 #include <vector>
 
 #include "layout/field.hpp"
@@ -38,5 +42,11 @@ struct Contacts {
   std::vector<ContactRim> rims;        // sorted by slot
   bool empty() const { return spheres.empty() && rims.empty(); }
 };
+
+struct Model;
+
+/// Contact points of all shapes of a model. Notes say which meshes were not found or not read, and so touch nothing, and how many
+/// stand as boxes.
+Contacts contacts_of(const Model& model, std::vector<std::string>& notes);
 
 }  // namespace linden

@@ -8,6 +8,7 @@
 #include "layout/attributes.hpp"
 #include "layout/body_constants.hpp"
 #include "layout/names.hpp"
+#include "layout/shapes.hpp"
 #include "layout/tree.hpp"
 
 namespace linden {
@@ -18,6 +19,8 @@ struct Model {
   Attributes attributes;
   std::vector<Mimic> mimics;
   Names names;
+  std::string source;                 // file it was read from, which names of meshes are relative to; empty = made in code
+  std::vector<BodyShape> shapes;      // sorted by slot; none of slot 0
   std::vector<std::string> warnings;  // what the source said that was read with a grain of salt
 
   /// Free coordinates: velocities less the mimic joints.
@@ -26,7 +29,8 @@ struct Model {
   /// Zero configuration [nq]: zeros, identity quaternions, mimic joints at their offsets.
   std::vector<double> neutral() const;
 
-  /// Hash of everything the motion depends on (topology, constants, mimics): a checkpoint belongs to one hash.
+  /// Hash of everything the motion depends on (topology, constants, mimics): a checkpoint belongs to one hash. Shapes move
+  /// nothing by themselves and are not in it.
   std::uint64_t hash() const;
 };
 

@@ -10,6 +10,7 @@
 #include <iterator>
 #include <mutex>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "layout/urdf_check.hpp"
@@ -203,19 +204,23 @@ std::string read_file(const std::string& file) {
 Model load_urdf(const std::string& file, Base base) { return parse_urdf(read_file(file), file, base); }
 
 Model parse_urdf(const std::string& xml, const std::string& source_name, Base base) {
-  const CheckedUrdf checked = check_urdf(xml, source_name);
+  CheckedUrdf checked = check_urdf(xml, source_name);
   const Robot robot(checked.xml, source_name);
   TreeBuilder builder(robot->getName());
   builder.source(source_name);
   for (const std::string& warning : checked.warnings) builder.warn(warning);
-  builder.add(root_spec(robot, base));
+  const auto add = [&](LinkSpec spec) {
+    if (const auto found = checked.shapes.find(spec.name); found != checked.shapes.end()) spec.shapes = std::move(found->second);
+    builder.add(std::move(spec));
+  };
+  add(root_spec(robot, base));
   for (const std::string& name : checked.joints) {
     const urdf::JointConstSharedPtr joint = robot->getJoint(name);
     const urdf::LinkConstSharedPtr link = joint ? robot->getLink(joint->child_link_name) : nullptr;
     if (!link)
       throw InputError(
           fmt::format("{}: urdfdom lost joint \"{}\"; expected plain text in names; rename it", source_name, name));
-    builder.add(spec_of(*joint, *link));
+    add(spec_of(*joint, *link));
   }
   return builder.build();
 }

@@ -8,7 +8,8 @@
 //   inertial at any origin, turned          turned into the link's axes
 //   link without inertial                   massless
 //   limit, dynamics, mimic                  limits, damping and friction, mimic
-//   shapes, sensors, all else               not read
+//   collision shapes                        shapes; meshes by name only, their files are not opened
+//   visuals, sensors, all else              not read
 //
 // A tree has one root link. With Base::fixed it is fixed to the world. With Base::floating a free joint called "base"
 // carries it, unless the file itself lets its robot float: where the root, with all that is fixed to it, has no mass

@@ -5,17 +5,16 @@
 
 #include <array>
 #include <cmath>
-#include <optional>
-#include <string_view>
 #include <utility>
 
+#include "layout/urdf_numbers.hpp"
+#include "layout/urdf_shapes.hpp"
 #include "layout/urdf_structure.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
 namespace {
 
-using tinyxml2::XMLAttribute;
 using tinyxml2::XMLElement;
 
 /// The numbers, checked one by one as they are written down again.
@@ -33,42 +32,6 @@ class Writer {
   }
 
  private:
-  double number(const std::string& owner, const XMLElement& element, const char* name) const {
-    const XMLAttribute* attribute = element.FindAttribute(name);
-    if (!attribute) {
-      report_.fail(element.GetLineNum(), fmt::format("{}: <{}> has no {}", owner, element.Name(), name),
-                   fmt::format("{}=\"...\"", name), "add it");
-    }
-    const std::vector<std::string_view> words = words_of(attribute->Value());
-    const std::optional<double> value = words.size() == 1 ? number_in(words[0]) : std::nullopt;
-    if (!value) {
-      report_.fail(attribute->GetLineNum(),
-                   fmt::format("{}: <{}> has {}={}", owner, element.Name(), name, quoted(attribute->Value())),
-                   "one finite number, such as 0.5", "correct it");
-    }
-    return *value;
-  }
-
-  double number_or(double otherwise, const std::string& owner, const XMLElement& element, const char* name) const {
-    return element.FindAttribute(name) ? number(owner, element, name) : otherwise;
-  }
-
-  std::array<double, 3> triple(const std::string& owner, const XMLElement& element, const char* name) const {
-    const XMLAttribute& attribute = *element.FindAttribute(name);
-    const std::vector<std::string_view> words = words_of(attribute.Value());
-    std::array<double, 3> result{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::optional<double> value = words.size() == 3 ? number_in(words[k]) : std::nullopt;
-      if (!value) {
-        report_.fail(attribute.GetLineNum(),
-                     fmt::format("{}: <{}> has {}={}", owner, element.Name(), name, quoted(attribute.Value())),
-                     "three finite numbers, such as \"0 0 0.5\"", "correct it");
-      }
-      result[k] = *value;
-    }
-    return result;
-  }
-
   void put(const char* attribute, double value) { printer_.PushAttribute(attribute, text_of(value).c_str()); }
   void put(const char* attribute, const std::array<double, 3>& value) {
     printer_.PushAttribute(attribute,
@@ -86,15 +49,11 @@ class Writer {
   }
 
   void write_origin(const std::string& owner, const XMLElement& parent) {
-    const XMLElement* origin = parent.FirstChildElement("origin");
+    const XMLElement* origin = numbers_.origin(owner, parent);
     if (!origin) return;
-    if (origin->FindAttribute("quat_xyzw")) {
-      report_.fail(origin->GetLineNum(), owner + ": <origin> has quat_xyzw", "rpy, roll pitch yaw in rad",
-                   "convert the quaternion");
-    }
     printer_.OpenElement("origin");
     for (const char* part : {"xyz", "rpy"}) {
-      if (origin->FindAttribute(part)) put(part, triple(owner, *origin, part));
+      if (origin->FindAttribute(part)) put(part, numbers_.three(owner, *origin, part));
     }
     printer_.CloseElement();
   }
@@ -107,7 +66,7 @@ class Writer {
                    mass ? "<inertia ixx=... iyy=... izz=.../> about the centre of mass" : "<mass value=\"...\"/>",
                    "add it, or delete the <inertial> of a link without mass");
     }
-    const double kilograms = number(owner, *mass, "value");
+    const double kilograms = numbers_.one(owner, *mass, "value");
     if (kilograms < 0) {
       report_.fail(mass->GetLineNum(), fmt::format("{}: its mass is {} kg", owner, text_of(kilograms)), "zero or more",
                    "correct the mass");
@@ -118,12 +77,12 @@ class Writer {
     put("value", kilograms);
     printer_.CloseElement();
     printer_.OpenElement("inertia");
-    for (const char* moment : {"ixx", "iyy", "izz"}) put(moment, number(owner, *inertia, moment));
+    for (const char* moment : {"ixx", "iyy", "izz"}) put(moment, numbers_.one(owner, *inertia, moment));
     for (const char* product : {"ixy", "ixz", "iyz"}) {
       if (!inertia->FindAttribute(product)) {
         report_.warn(inertia->GetLineNum(), fmt::format("{}: <inertia> has no {}; read as 0", owner, product));
       }
-      put(product, number_or(0, owner, *inertia, product));
+      put(product, numbers_.one_or(0, owner, *inertia, product));
     }
     printer_.CloseElement();
     printer_.CloseElement();
@@ -144,8 +103,8 @@ class Writer {
       const XMLElement& mimic = *joint.element->FirstChildElement("mimic");
       printer_.OpenElement("mimic");
       put("joint", robot_.joint(joint.leader).name);
-      put("multiplier", number_or(1, owner, mimic, "multiplier"));
-      put("offset", number_or(0, owner, mimic, "offset"));
+      put("multiplier", numbers_.one_or(1, owner, mimic, "multiplier"));
+      put("offset", numbers_.one_or(0, owner, mimic, "offset"));
       printer_.CloseElement();
     }
     printer_.CloseElement();
@@ -164,7 +123,7 @@ class Writer {
       report_.fail(axis->GetLineNum(), owner + ": <axis> has no xyz", "<axis xyz=\"...\"/>",
                    "add it, or delete the <axis> for \"1 0 0\"");
     }
-    const std::array<double, 3> xyz = triple(owner, *axis, "xyz");
+    const std::array<double, 3> xyz = numbers_.three(owner, *axis, "xyz");
     // An axis this short is the rounding of a zero, not a direction.
     constexpr double kShortest = 1e-9;
     if (!(std::hypot(xyz[0], xyz[1], xyz[2]) > kShortest)) {
@@ -189,8 +148,8 @@ class Writer {
           report_.warn(line, fmt::format("{} has no {} limit; read as 0, as the URDF standard says", owner,
                                          has_lower ? "upper" : "lower"));
         }
-        lower = number_or(0, owner, *limit, "lower");
-        upper = number_or(0, owner, *limit, "upper");
+        lower = numbers_.one_or(0, owner, *limit, "lower");
+        upper = numbers_.one_or(0, owner, *limit, "upper");
         if (lower > upper) {
           report_.fail(
               line,
@@ -207,7 +166,7 @@ class Writer {
     put("lower", lower);
     put("upper", upper);
     for (const char* most : {"effort", "velocity"}) {
-      const double value = limit ? number_or(kUnlimited, owner, *limit, most) : kUnlimited;
+      const double value = limit ? numbers_.one_or(kUnlimited, owner, *limit, most) : kUnlimited;
       if (value < 0) {
         report_.warn(limit->GetLineNum(),
                      fmt::format("{}: its {} limit is {}; read as unlimited", owner, most, text_of(value)));
@@ -222,7 +181,7 @@ class Writer {
     if (!dynamics) return;
     printer_.OpenElement("dynamics");
     for (const char* loss : {"damping", "friction"}) {
-      const double value = number_or(0, owner, *dynamics, loss);
+      const double value = numbers_.one_or(0, owner, *dynamics, loss);
       if (value < 0) {
         report_.fail(dynamics->GetLineNum(), fmt::format("{}: its {} is {}", owner, loss, text_of(value)),
                      "zero or more", "correct it: losses take energy away");
@@ -234,6 +193,7 @@ class Writer {
 
   const UrdfStructure& robot_;
   UrdfReport& report_;
+  UrdfNumbers numbers_{report_};
   tinyxml2::XMLPrinter printer_{nullptr, true};
 };
 
@@ -244,6 +204,9 @@ CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name) {
   const UrdfStructure robot(xml, report);
   CheckedUrdf result;
   result.xml = Writer(robot, report).run();
+  for (const UrdfLink& link : robot.links()) {
+    if (std::vector<LinkShape> shapes = shapes_of(link, report); !shapes.empty()) result.shapes[link.name] = std::move(shapes);
+  }
   for (const UrdfJoint& joint : robot.joints()) result.joints.push_back(joint.name);
   result.warnings = std::move(report.warnings);
   return result;

@@ -6,8 +6,9 @@
 //   refuses       revolute and prismatic joints without <limit>, <limit> without effort or velocity, "1.0 ", tabs
 //   falls over    deeply nested markup (it recurses), % in a bad number (its message is used as a printf format)
 // The text written here has none of these: links with their <inertial>; joints with origin, parent, child, axis, limit,
-// mimic and dynamics; every number in the shortest form that reads back to the same double. Shapes, materials, sensors,
-// transmissions and unknown elements are left out unread.
+// mimic and dynamics; every number in the shortest form that reads back to the same double. Collision shapes do not pass through
+// urdfdom, which knows no capsules: they are read here (layout/urdf_shapes.hpp). Visuals, materials, sensors, transmissions and
+// unknown elements are left out unread.
 //
 //   what the file says                              what becomes of it
 //   revolute or prismatic joint without limits      unlimited, with a warning
@@ -23,7 +24,10 @@
 
 #include <limits>
 #include <string>
+#include <unordered_map>
 #include <vector>
+
+#include "layout/shapes.hpp"
 
 namespace linden {
 
@@ -33,6 +37,7 @@ inline constexpr double kUnlimited = std::numeric_limits<double>::max();
 struct CheckedUrdf {
   std::string xml;                    // for urdfdom; one root link, no loops, every name found
   std::vector<std::string> joints;    // names in the order of the file, which urdfdom forgets
+  std::unordered_map<std::string, std::vector<LinkShape>> shapes;  // of the links that have any
   std::vector<std::string> warnings;  // `file:line: what was found; how it is read`
 };
 

@@ -20,15 +20,17 @@ std::string quoted(std::string_view text) {
   return fmt::format("\"{}{}\"", shown, text.size() > kShown ? "..." : "");
 }
 
-std::vector<std::string_view> words_of(std::string_view text) {
+std::string_view next_word(std::string_view& rest) {
   constexpr std::string_view kSpace = " \t\r\n";
+  rest.remove_prefix(std::min(rest.find_first_not_of(kSpace), rest.size()));
+  const std::string_view word = rest.substr(0, rest.find_first_of(kSpace));
+  rest.remove_prefix(word.size());
+  return word;
+}
+
+std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
-  for (std::size_t begin = text.find_first_not_of(kSpace); begin != text.npos;
-       begin = text.find_first_not_of(kSpace, begin)) {
-    const std::size_t end = std::min(text.find_first_of(kSpace, begin), text.size());
-    words.push_back(text.substr(begin, end - begin));
-    begin = end;
-  }
+  for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) words.push_back(word);
   return words;
 }
 

@@ -16,6 +16,9 @@ namespace linden {
 /// Text of a file inside a message: on one line, cut where it is long.
 std::string quoted(std::string_view text);
 
+/// Cuts the next word between spaces, tabs and line ends off `rest`; empty when there is none.
+std::string_view next_word(std::string_view& rest);
+
 /// The words between spaces, tabs and line ends; they point into `text`.
 std::vector<std::string_view> words_of(std::string_view text);
 

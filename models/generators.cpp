@@ -94,6 +94,7 @@ void add_humanoid(TreeBuilder& builder, Index number) {
   pelvis.type = JointType::free;
   pelvis.placement = shifted(static_cast<double>(number - 1));
   pelvis.inertia = box_inertia(6.2, {0.2, 0.28, 0.16}, {0, 0, 0.05});
+  pelvis.shapes = {box_shape({0.2, 0.28, 0.16}, {0, 0, 0.05})};
   builder.add(pelvis);
   const auto limb = [&](const char* side, const char* parent, Vector3d at, std::span<const Segment> segments) {
     std::string before = fmt::format("{}{}", parent, number);
@@ -105,6 +106,7 @@ void add_humanoid(TreeBuilder& builder, Index number) {
       link.placement = Isometry3d(Eigen::Translation3d(at + segment.along * z));
       link.axis = segment.axis;
       link.inertia = box_inertia(segment.mass, segment.size, segment.center * z);
+      if (segment.size != knuckle) link.shapes = {box_shape(segment.size, segment.center * z)};
       at.setZero();
       builder.add(std::move(link));
     }

@@ -23,7 +23,8 @@ Model ball_chain(Index links);
 Model balanced_tree(Index bodies, Index branching = 2);
 
 /// `count` humanoids in one system, each a tree of its own: a pelvis on a free joint, waist and neck of three hinges, arms and legs of six;
-/// 31 bodies, 36 degrees of freedom and 75 kg each, a metre apart along x.
+/// 31 bodies, 36 degrees of freedom and 75 kg each, a metre apart along x. All boxes but the small ones between two hinges are
+/// collision shapes too; the other models have none.
 Model humanoids(Index count);
 inline constexpr Index kHumanoidBodies = 31, kHumanoidFreedom = 36;
 

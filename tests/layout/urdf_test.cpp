@@ -16,14 +16,8 @@
 #include <map>
 #include <thread>
 
+#include "tests/layout/robots.hpp"
 #include "tests/reference/urdf_plain.hpp"
-
-#ifndef LINDEN_ROBOTS_DIR
-#define LINDEN_ROBOTS_DIR "../shared/robots"
-#endif
-#ifndef LINDEN_MODELS_DIR
-#define LINDEN_MODELS_DIR "models"
-#endif
 
 using namespace linden;
 using Catch::Matchers::Contains;
@@ -35,45 +29,6 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// Every URDF file at hand: real robots and linden's own.
-std::vector<std::string> robot_files() {
-  std::vector<std::string> files;
-  for (const char* folder : {LINDEN_ROBOTS_DIR, LINDEN_MODELS_DIR}) {
-    if (!std::filesystem::is_directory(folder)) {
-      WARN("no folder " << folder << ": its robots are not tested");
-      continue;
-    }
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      if (entry.path().extension() == ".urdf") files.push_back(entry.path().string());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-/// Path of a real robot's file; empty, with a warning, where it is absent.
-std::string real_robot(const std::string& name) {
-  const std::string file = std::string(LINDEN_ROBOTS_DIR) + "/" + name;
-  if (std::filesystem::exists(file)) return file;
-  WARN("no file " << file << ": not tested");
-  return "";
-}
-
-/// Pose of a body at zero: tree placements multiplied up to the world.
-Eigen::Matrix4d body_pose(const Model& model, Index slot) {
-  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
-  for (; slot != 0; slot = model.tree.parent(slot)) {
-    Eigen::Matrix4d step = Eigen::Matrix4d::Identity();
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column)
-        step(row, column) = model.constants.tree_placement(slot, 3 * row + column);
-      step(row, 3) = model.constants.tree_placement(slot, 9 + row);
-    }
-    pose = step * pose;
-  }
-  return pose;
-}
 
 Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
   Eigen::Matrix3d result;
@@ -109,19 +64,6 @@ std::string text(std::initializer_list<std::string> lines) {
   std::string result;
   for (const std::string& line : lines) result += line + "\n";
   return result;
-}
-
-std::string robot(const std::string& content) { return "<robot name=\"r\">" + content + "</robot>"; }
-
-const std::string kInertial =
-    "<inertial><mass value=\"2\"/><inertia ixx=\"3\" iyy=\"4\" izz=\"5\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
-
-std::string link(const std::string& name) { return "<link name=\"" + name + "\">" + kInertial + "</link>"; }
-
-std::string joint(const std::string& name, const std::string& type, const std::string& parent, const std::string& child,
-                  const std::string& more = "") {
-  return fmt::format(R"(<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/>{}</joint>)", name, type,
-                     parent, child, more);
 }
 
 const std::string kLimit = R"(<limit lower="-1" upper="2" velocity="3" effort="4"/>)";
@@ -491,11 +433,11 @@ TEST_CASE("numbers are read with a decimal point in every locale") {
   REQUIRE_THAT(message, Contains("three finite numbers"));
 }
 
-TEST_CASE("shapes, sensors and unknown elements are neither errors nor noise") {
+TEST_CASE("visuals, sensors and unknown elements are neither errors nor noise") {
   const Ear ear;
   const std::string xml = robot(
       "<material name=\"m\"/><gazebo><plugin/></gazebo><sensor name=\"s\" type=\"imu\"/><sensor:ray name=\"s\"/>"
-      "<link name=\"a\"><visual><geometry><torus/></geometry></visual><collision/></link>" +
+      "<link name=\"a\"><visual><geometry><torus/></geometry></visual></link>" +
       link("b") +
       joint("j", "revolute", "a", "b", kLimit + "<safety_controller/><calibration rising=\"x\"/><dynamics/><spin/>"));
   REQUIRE(parse(xml).warnings.empty());

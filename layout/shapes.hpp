@@ -1,0 +1,43 @@
+// layout/shapes.hpp
+// Collision shapes as a robot's file gives them: plain values, nothing worked out yet. What a ground makes of them stands in
+// layout/contacts.hpp.
+//
+//   kind       size
+//   sphere     radius
+//   box        edges along x, y, z
+//   cylinder   radius, length along z
+//   capsule    radius, length along z from the centre of one round end to that of the other
+//   mesh       scale along x, y, z of the points in its file; a negative one mirrors
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "layout/names.hpp"
+
+namespace linden {
+
+enum class ShapeKind : std::uint8_t { sphere, box, cylinder, capsule, mesh };
+
+struct CollisionShape {
+  ShapeKind kind = ShapeKind::sphere;
+  std::array<double, 3> size{};  // [m], of a mesh [1]; what a kind does not use is 0
+  std::string mesh;              // the file, as the source calls it
+};
+
+/// A shape of a link; the centre of all but meshes is the pose's.
+struct LinkShape {
+  Pose pose = Pose::Identity();  // in the link's frame
+  CollisionShape shape;
+};
+
+/// The same once links are merged into bodies.
+struct BodyShape {
+  Index slot;
+  std::string link;  // that had it
+  Pose pose;         // in the body's frame
+  CollisionShape shape;
+};
+
+}  // namespace linden

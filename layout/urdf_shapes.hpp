@@ -1,0 +1,20 @@
+// layout/urdf_shapes.hpp
+// The <collision> elements of a link: an <origin> and the first shape within <geometry>.
+//
+//   <sphere radius/>  <box size/>  <cylinder radius length/>  <mesh filename scale/>     as the URDF standard has them
+//   <capsule radius length/>                                                             an extension; length without the ends
+//
+// Sizes are zero or more; a mesh may be mirrored by a negative scale. Files of meshes are not opened. Another shape, or none, is
+// left out with a warning; a number or name that is missing or wrong throws InputError, as in layout/urdf_check.hpp.
+#pragma once
+
+#include <vector>
+
+#include "layout/shapes.hpp"
+#include "layout/urdf_structure.hpp"
+
+namespace linden {
+
+std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report);
+
+}  // namespace linden
