@@ -13,6 +13,9 @@ namespace {
 
 constexpr double kUsualGravity = 9.81;
 
+/// Share of the weight of all bodies that a contact point is taken to bear at least, where its friction is made to stick.
+constexpr double kLeastLoad = 1e-2;
+
 /// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included.
 std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>& rotors) {
   const Tree& tree = model.tree;
@@ -106,7 +109,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
     const auto& g = options.gravity;
     const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     ground.frame = plane_frame(effects.ground->normal);
-    ground.stick = model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity) / kCreep;
+    ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
     for (const GroundPoint& point : points) ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass(point.slot)));
   }
 

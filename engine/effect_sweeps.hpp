@@ -166,17 +166,24 @@ class EffectSweeps {
   }
 
   /// States that belong to the solution so far. `settled`: the residual is small, so that impulses that hold can be judged. delta is
-  /// changed where a joint comes to rest. Returns in which instances something changed: the factor is out of date there.
+  /// changed where a joint comes to rest. Of what sticks too hard all start to slide, or, where `one_by_one`, that alone which does
+  /// most: slower, and never in a circle. Returns in which instances something changed: the factor is out of date there.
   template <class Mask>
-  auto revise(const Field<S>& residual, const Mask& settled, Field<S>& delta) {
+  auto revise(const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
+    using std::max;
     auto changed = S(0.0) > S(1.0);
+    S least(0.0);
+    if (any(one_by_one)) {
+      const S overload = max(friction_overload(frictions_, h_, residual), ground_overload(points_));
+      least = select(one_by_one, overload, least);
+    }
     if (plan_.joints) {
       changed = revise_servos(servos_, plan_.q_row, h_, *q_, delta);
-      changed = revise_friction(frictions_, h_, residual, settled, delta) || changed;
+      changed = revise_friction(frictions_, h_, residual, settled, least, delta) || changed;
       changed = revise_limits(limits_, residual, settled, delta) || changed;
       if (any(changed)) assemble();
     }
-    if (!plan_.ground.points.empty()) changed = revise_ground(points_, settled) || changed;
+    if (!plan_.ground.points.empty()) changed = revise_ground(points_, settled, least) || changed;
     return changed;
   }
 

@@ -38,6 +38,9 @@ constexpr Index kPart = 64;
 /// Revisions of effects' states in one solve: a pile of joints that stick and slide at once takes some ten.
 constexpr int kMostRevisions = 60;
 
+/// From then on they are made one by one.
+constexpr int kBulkRevisions = 5;
+
 /// Relative residual from which on impulses that hold a joint or a contact are those of the solution, but for this much.
 constexpr double kSettled = 1e-4;
 
@@ -341,8 +344,8 @@ void Stepper::begin_effects(const State<double>& state, int history, double h) {
 }
 
 /// Whether the state of an effect changed; work_.delta then says what the motion is to be.
-bool Stepper::revise_effects(bool settled) {
-  if (!effects_->revise(left(), settled, work_.delta)) return false;
+bool Stepper::revise_effects(bool settled, bool one_by_one) {
+  if (!effects_->revise(left(), settled, one_by_one, work_.delta)) return false;
   displacement_map(model_.tree, work_.motion, work_.delta);
   return true;
 }
@@ -508,7 +511,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   const bool revises = effects_ && effects_->plan().revises;
   int revisions = 0;
   const auto revised = [&](bool settled) {
-    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kMostRevisions || !revise_effects(settled)) return false;
+    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kMostRevisions || !revise_effects(settled, revisions >= kBulkRevisions)) return false;
     revisions += 1;
     report.iterations += 1;
     now = evaluate(report, start);

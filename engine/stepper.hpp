@@ -101,7 +101,7 @@ class Stepper {
   void with_added(const Action& action);
   void begin_effects(const State<double>& state, int history, double h);
   void act(Evaluated& now);
-  bool revise_effects(bool settled);
+  bool revise_effects(bool settled, bool one_by_one);
   double fall(double h) const;
   const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
   double work(const Field<double>& force) const;

@@ -60,11 +60,29 @@ void hold_friction(const Frictions<S>& frictions, JointImpulses<S>& sum) {
   }
 }
 
-/// The modes that belong to delta, which is set to zero where a joint comes to hold; where `settled`, joints that hold too much start to
-/// slide. Returns in which instances one changed.
-template <class S, class Mask>
-auto revise_friction(Frictions<S>& frictions, const S& h, const Field<S>& residual, const Mask& settled, Field<S>& delta) {
+/// Impulse that holds a joint as a share of what friction can; zero where it slides.
+template <class S>
+LINDEN_INLINE S friction_load(const Frictions<S>& frictions, Index k, const S& h, const Field<S>& residual) {
   using std::abs;
+  const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
+  const S zero(0.0), most = h * h * as<S>(friction.force), held = abs(residual(friction.row));
+  return select(frictions.mode(k) == zero, select(held > zero, held / most, zero), zero);
+}
+
+/// Largest load of any joint that holds.
+template <class S>
+S friction_overload(const Frictions<S>& frictions, const S& h, const Field<S>& residual) {
+  using std::max;
+  S most(0.0);
+  for (Index k = 0; k < frictions.mode.rows(); ++k) most = max(most, friction_load(frictions, k, h, residual));
+  return most;
+}
+
+/// The modes that belong to delta, which is set to zero where a joint comes to hold; where `settled`, joints that hold more than `least`
+/// times what friction can start to slide. Returns in which instances one changed.
+template <class S, class Mask>
+auto revise_friction(Frictions<S>& frictions, const S& h, const Field<S>& residual, const Mask& settled, const S& least,
+                     Field<S>& delta) {
   const S zero(0.0);
   auto changed = zero > S(1.0);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
@@ -72,8 +90,8 @@ auto revise_friction(Frictions<S>& frictions, const S& h, const Field<S>& residu
     S& d = delta(friction.row);
     const S& mode = frictions.mode(k);
     const S& r = residual(friction.row);
-    const auto holds = mode == zero;
-    const auto breaks = holds && settled && abs(r) > h * h * as<S>(friction.force);
+    const S load = friction_load(frictions, k, h, residual);
+    const auto breaks = settled && load > S(1.0) && load >= least;
     const auto turns = mode * d < zero;
     const S next = select(breaks, -sign_of(r), select(turns, zero, mode));
     d = select(turns, zero, d);

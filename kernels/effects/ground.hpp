@@ -3,7 +3,7 @@
 // solve.
 //
 //   normal    N = max(0, -(P(gap^k+1) - P(gap^k)) / rise - c' (m^k+1 - m^k) / h),    m = min(gap, 0),  P = 1/2 k m^2
-//   sticks    F_t = -(b / h) t                   as long as |F_t| <= friction N
+//   sticks    F_t = -b t                         as long as |F_t| <= friction N,    b = friction max(k depth^k, N_least) / (h creep)
 //   slides    F_t = -friction N t / |t|          as long as t does not turn back
 //
 // rise = n.D_c, D_c the displacement of the sphere's centre, gap^k+1 = gap^k + rise; t is the displacement along the ground of its lowest
@@ -11,9 +11,10 @@
 // gradient) makes the work of the spring exactly -dP, also where a step begins above the ground and ends in it: a bounce neither
 // gains nor loses. c' = c + (s - 1/2) h k.
 //
-// b is so large that what sticks creeps by less than kCreep: stiff, so it is taken by backward Euler (share 1), the normal force with the
-// share s that its stiffness calls for (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are revised
-// within the solve until they are those of the solution.
+// What sticks creeps by some kCreep at the limit of its friction and by less below it, the points of a foot in proportion to the load
+// that each bore at the beginning of the step. That is stiff, so it is taken by backward Euler (share 1), the normal force with the share s that its stiffness calls for
+// (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are revised within the solve until they are those of
+// the solution.
 //
 // A rim of a cylinder stands as four points: the lowest of its circle, the highest, and the two between, found anew each step.
 //
@@ -32,7 +33,7 @@
 
 namespace linden {
 
-/// Speed at which a point that carries the weight of the whole scene creeps along, at the limit of its friction [m/s].
+/// Speed at which a point that sticks creeps along at the limit of its friction: 60 micrometres a minute [m/s].
 inline constexpr double kCreep = 1e-6;
 
 /// Slower points are first taken to stick [m/s].
@@ -47,7 +48,7 @@ inline constexpr double kStickingSpeed = 1e-3;
   FIELD(Scalar, slides, 1, slots, "1 slides, 0 sticks")                                               \
   FIELD(Scalar, closed, 1, slots, "1 where the ground pushes, in the evaluation last made")           \
   FIELD(Scalar, factored, 1, slots, "closed, as the factor has it")                                   \
-  FIELD(Scalar, excess, 1, slots, "of the force of sticking over what friction can, [N], likewise")   \
+  FIELD(Scalar, load, 1, slots, "force of sticking as a share of what friction can, likewise")        \
   FIELD(Scalar, push, 1, slots, "N, likewise [N]")                                                    \
   FIELD(Scalar, drag, 3, slots, "F_t, likewise, body frame at k [N]")                                 \
   FIELD(Scalar, rise, 1, slots, "n.D_c, likewise [m]")                                                \
@@ -74,7 +75,7 @@ struct GroundPoint {
 struct GroundPlan {
   Ground ground;
   Mat3<double> frame{};   // rows: x, y and normal of the plane, world frame
-  double stick = 0;       // b [N s/m]
+  double least_load = 0;  // N_least [N]
   std::vector<GroundPoint> points;  // sorted by slot
   std::vector<double> share;        // s of the normal force, one number a point
 };
@@ -182,12 +183,13 @@ void guess_ground(const GroundPlan& plan, const S& h, const Field<S, 7>& displac
 template <class S>
 void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& h, const Field<S, 7>& displacement,
                 GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
+  using std::max;
   using std::min;
   using std::sqrt;
   const S zero(0.0), half(0.5), one(1.0), rate = one / h, scale = h * h;
   const Ground& ground = plan.ground;
   const S stiff = as<S>(ground.stiffness), damp = rate * as<S>(ground.damping), mu = as<S>(ground.friction);
-  const S stick = rate * as<S>(plan.stick);
+  const S stick = mu / (h * as<S>(kCreep));
   for (std::size_t at = first; at < last; ++at) {
     const Index k = static_cast<Index>(at), i = plan.points[at].slot;
     const auto c = load<Vec3, S>(points.center, k), n = load<Vec3, S>(points.normal, k);
@@ -215,7 +217,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const auto slides = points.slides(k) > zero;
     const S per_length = select(length > zero, one / length, zero);
     const Vec3<S> direction = per_length * t;
-    const S b = select(closed, select(slides, mu * N * per_length, stick), zero);
+    const S b = select(closed, select(slides, mu * N * per_length, stick * max(-stiff * gap, as<S>(plan.least_load))), zero);
     const Vec3<S> drag = -b * t, push = N * n;
 
     const Mat3<S> R = rotation(D.r);
@@ -230,23 +232,32 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     store(points.slip_before, k, load<Vec3, S>(points.slip, k));
     store(points.slip, k, t);
     points.closed(k) = select(closed, one, zero);
-    points.excess(k) = select(slides, zero, b * length - mu * N);
+    points.load(k) = select(closed && points.slides(k) == zero, b * length / (mu * N), zero);
     points.push(k) = N;
     store(points.drag, k, drag);
     points.rise(k) = rise;
   }
 }
 
-/// The states that belong to the evaluation last made. Where `settled`, points that stick with more than friction can give start to slide.
-/// Returns in which instances one changed, or where the ground starts or ceases to push.
+/// Largest load of any point that sticks.
+template <class S>
+S ground_overload(const GroundPoints<S>& points) {
+  using std::max;
+  S most(0.0);
+  for (Index k = 0; k < points.load.rows(); ++k) most = max(most, points.load(k));
+  return most;
+}
+
+/// The states that belong to the evaluation last made. Where `settled`, points that stick with more than `least` times what friction can
+/// give start to slide. Returns in which instances one changed, or where the ground starts or ceases to push.
 template <class S, class Mask>
-auto revise_ground(GroundPoints<S>& points, const Mask& settled) {
+auto revise_ground(GroundPoints<S>& points, const Mask& settled, const S& least) {
   const S zero(0.0), one(1.0);
   auto changed = zero > one;
   for (Index k = 0; k < points.slides.rows(); ++k) {
     const auto closed = points.closed(k) > zero;
     const auto slides = points.slides(k) > zero;
-    const auto breaks = closed && !slides && settled && points.excess(k) > zero;
+    const auto breaks = closed && !slides && settled && points.load(k) > one && points.load(k) >= least;
     const auto turns = closed && slides && dot(load<Vec3, S>(points.slip, k), load<Vec3, S>(points.slip_before, k)) <= zero;
     changed = changed || breaks || turns || points.closed(k) != points.factored(k);
     points.slides(k) = select(breaks, one, select(turns, zero, points.slides(k)));
