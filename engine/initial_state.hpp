@@ -23,6 +23,9 @@ struct InitialState {
   std::vector<double> velocities;  // [nv]
 };
 
+inline constexpr std::uint64_t kDefaultSeed = 1;
+inline constexpr double kDefaultSpread = 0.1;
+
 InitialState random_state(const Model& model, std::uint64_t seed, double spread);
 
 }  // namespace linden

@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "engine/effects_text.hpp"
 #include "engine/load_model.hpp"
 #include "engine/mass_distribution.hpp"
 #include "engine/output_file.hpp"
@@ -121,6 +122,7 @@ class Printer {
 
   void print() const {
     totals();
+    effects();
     table();
     conventions();
     merged();
@@ -158,6 +160,15 @@ class Printer {
     row("memory", fmt::format("state {}, constants {}, workspace {}", memory_text(bytes_for<State<double>>(tree.shape)),
                               memory_text(bytes_for<BodyConstants<double>>(tree.shape) + bytes_for<Tree>(tree.shape)),
                               memory_text(bytes_for<Workspace<double>>(tree.shape))));
+  }
+
+  void effects() const {
+    if (!arguments_.scene) return;
+    const Scene& scene = *arguments_.scene;
+    fmt::print("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
+    const auto& g = arguments_.options.gravity;
+    if (g != std::array<double, 3>{0, 0, 0}) fmt::print("  {:<9} {:g} {:g} {:g} m/s^2\n", "gravity", g[0], g[1], g[2]);
+    for (const EffectLine& line : effect_lines(scene.effects, model_)) fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
   }
 
   void table() const {
@@ -316,6 +327,14 @@ Json json_of(const InspectArguments& arguments, const Model& model) {
   for (const Sweep& sweep : sweeps_of(model, arguments.options)) {
     sweeps.push_back({{"when", sweep.when}, {"name", sweep.name}, {"reads", sweep.reads}, {"writes", sweep.writes}});
   }
+  if (arguments.scene) {
+    const Scene& scene = *arguments.scene;
+    result["step"] = arguments.options.step;
+    result["duration"] = scene.duration;
+    result["gravity"] = arguments.options.gravity;
+    result["effects"] = effects_json(scene.effects, model);
+    result["initial"] = {{"positions", scene.initial.positions}, {"velocities", scene.initial.velocities}};
+  }
   result["warnings"] = model.warnings;
   return result;
 }
@@ -326,7 +345,8 @@ int inspect(const InspectArguments& arguments) {
   check(arguments.options);
   if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
   if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
-  const Model model = load_model(arguments.model, arguments.base);
+  const Model loaded = arguments.scene ? Model() : load_model(arguments.model, arguments.base);
+  const Model& model = arguments.scene ? arguments.scene->model : loaded;
   if (!arguments.json.empty()) {
     write_json(arguments.json, json_of(arguments, model));
   }

@@ -1,16 +1,19 @@
 // engine/inspect.hpp
-// `linden inspect`: what a model is once it is loaded, and what a step of it computes.
+// `linden inspect`: what a model or scene is once it is loaded, and what a step of it computes.
 //
+//   effects      of a scene, a line each
 //   bodies       slot, body, parent, joint, rows in q and v, mass, limits; links merged into them; mimic joints
 //   conventions  which row is which, order of quaternions and twists, frames
 //   totals       counts, mass, centre of mass, levels, runs, memory
 //   sweeps       of one step in order, with what each reads and writes
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "engine/options.hpp"
+#include "engine/scene.hpp"
 #include "layout/urdf.hpp"
 
 namespace linden {
@@ -18,6 +21,7 @@ namespace linden {
 struct InspectArguments {
   std::string model;
   std::optional<Base> base;
+  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
   Options options;    // gravity and solver decide which sweeps there are
   bool all = false;   // print long tables whole
   std::string json;   // file; empty = none

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <string_view>
 
+#include "engine/scene_file.hpp"
 #include "engine/text.hpp"
 #include "models/generators.hpp"
 
@@ -56,6 +57,9 @@ Base base_from(const std::string& text) {
 }
 
 Model load_model(const std::string& name, std::optional<Base> base) {
+  if (is_scene(name)) {
+    throw InputError(fmt::format("{}: scenes are for linden run and linden inspect; expected a model here; give a URDF file or chain:3", name));
+  }
   if (!is_generated(name)) return load_urdf(name, base.value_or(Base::fixed));
   if (base) throw InputError(fmt::format("--base is for URDF files; {} is generated, base and all: leave --base out", name));
   check_memory(name);

@@ -10,7 +10,7 @@
 namespace linden {
 
 /// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N. `base` is for URDF files (fixed where it is not
-/// given); throws InputError where it is given for a generated model, and for whatever cannot be read.
+/// given); throws InputError where it is given for a generated model, for a scene, and for whatever cannot be read.
 Model load_model(const std::string& name, std::optional<Base> base);
 
 /// Throws InputError where `what` needs more bytes than the machine has: asked for too much, Linux ends programs without a word.

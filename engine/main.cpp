@@ -21,6 +21,7 @@
 #include "engine/rollout_command.hpp"
 #include "engine/run_command.hpp"
 #include "engine/scaling_command.hpp"
+#include "engine/scene_file.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
 #include "layout/words.hpp"
@@ -69,8 +70,26 @@ void read_motion_options(const Texts& texts, MotionArguments& motion, Options& o
   if (!texts.spread.empty()) motion.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
 }
 
+/// Loads the scene that `model` names; null where it names a model. What the command line says of its start goes over the scene's.
+std::shared_ptr<const Scene> scene_named(const std::string& model, const std::optional<Base>& base, const SceneStart& start) {
+  if (!is_scene(model)) return nullptr;
+  if (base) throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", model));
+  if (start.spread) check_spread(*start.spread);
+  return std::make_shared<const Scene>(load_scene(model, start));
+}
+
 void read_run_options(const Texts& texts, RunArguments& run) {
   read_motion_options(texts, run, run.options);
+  if (!run.load.empty() && randomness(run)) {
+    throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
+  }
+  run.scene = scene_named(run.model, run.base, {run.seed, run.spread});
+  if (run.scene) {
+    run.options = run.scene->options;
+    run.duration = run.scene->duration;
+    // what the command line says goes over the scene
+    read_motion_options(texts, run, run.options);
+  }
   if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
   if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
   if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
@@ -107,9 +126,15 @@ void read_scaling_options(const Texts& texts, ScalingArguments& scaling) {
 
 void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
   read_model_options(texts, inspect.base, inspect.options);
+  inspect.scene = scene_named(inspect.model, inspect.base, {});
+  if (inspect.scene) {
+    inspect.options = inspect.scene->options;
+    read_model_options(texts, inspect.base, inspect.options);
+  }
   if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
 }
 
+constexpr const char* kSceneHelp = "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 
 /// Options of one command, each a text until all have been read.
@@ -119,7 +144,9 @@ struct Adding {
   void operator()(const char* group, const char* name, std::string& text, const char* value, const char* meaning) const {
     command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
   }
-  void model(std::string& name) const { command->add_option("MODEL", name, kModelHelp)->required()->option_text(" "); }
+  void model(std::string& name, const char* help = kModelHelp) const {
+    command->add_option("MODEL", name, help)->required()->option_text(" ");
+  }
   void base(const char* group, Texts& texts) const {
     (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
   }
@@ -134,9 +161,9 @@ struct Adding {
 };
 
 CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
-  CLI::App* command = program.add_subcommand("run", "Simulate one model.");
+  CLI::App* command = program.add_subcommand("run", "Simulate one model or scene.");
   const Adding add{command};
-  add.model(run.model);
+  add.model(run.model, kSceneHelp);
   add.base("Motion", texts);
   add.duration(texts);
   add.step(texts);
@@ -154,8 +181,10 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");
   add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
   command->footer(
-      "Coordinates are named after their joints; quaternions are x y z w. Ctrl-C ends a run early and keeps its files.\n\n"
+      "Coordinates are named after their joints; quaternions are x y z w. Ctrl-C ends a run early and keeps its files.\n"
+      "What is given here goes over what a scene says.\n\n"
       "Examples:\n"
+      "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"
       "  linden run models/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --plot energy.png\n"
       "  linden run chain:100 --duration 5 --dt 1e-3 --record chain.csv --json chain.json");
   return command;
@@ -211,9 +240,9 @@ CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling
 }
 
 CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
-  CLI::App* command = program.add_subcommand("inspect", "Print a model: bodies, coordinates, masses, sweeps of a step.");
+  CLI::App* command = program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
   const Adding add{command};
-  add.model(inspect.model);
+  add.model(inspect.model, kSceneHelp);
   add.base("Options", texts);
   add.gravity("Options", texts);
   add("Options", "--solver", texts.solver, "NAME", "newton (default) or riqn");

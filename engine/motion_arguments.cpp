@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "engine/initial_state.hpp"
 #include "engine/load_model.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
@@ -12,8 +13,6 @@
 namespace linden {
 namespace {
 
-constexpr std::uint64_t kDefaultSeed = 1;
-constexpr double kDefaultSpread = 0.1;
 constexpr double kMostSteps = 1e12;
 
 }  // namespace
@@ -56,13 +55,16 @@ std::string gravity_text(const Options& options) {
   return fmt::format("gravity {:g} {:g} {:g} m/s^2", g[0], g[1], g[2]);
 }
 
-LeftOut::LeftOut(const Model& model) {
+LeftOut::LeftOut(const Model& model, const Effects& effects) {
   for (Index slot = 1; slot < model.tree.shape.slots; ++slot) {
     const Index row = model.tree.first_v(slot);
     limits += std::isfinite(model.attributes.lower(row)) || std::isfinite(model.attributes.upper(row)) ? 1 : 0;
     damping += model.attributes.damping(row) > 0 ? 1 : 0;
     friction += model.attributes.friction(row) > 0 ? 1 : 0;
   }
+  if (!effects.limits.empty()) limits = 0;
+  if (!effects.damping.empty()) damping = 0;
+  if (!effects.friction.empty()) friction = 0;
 }
 
 std::string LeftOut::text() const {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "engine/options.hpp"
+#include "layout/effects.hpp"
 #include "layout/urdf.hpp"
 
 namespace linden {
@@ -37,10 +38,10 @@ std::string model_text(const MotionArguments& arguments, const Model& model);
 /// "gravity 0 0 -9.81 m/s^2", "no gravity"
 std::string gravity_text(const Options& options);
 
-/// What the file says of its joints and nothing obeys.
+/// What the model's file says of its joints and no effect takes up.
 struct LeftOut {
   int limits = 0, damping = 0, friction = 0;
-  explicit LeftOut(const Model& model);
+  explicit LeftOut(const Model& model, const Effects& effects = {});
   /// Empty where there is nothing.
   std::string text() const;
 };

@@ -63,10 +63,22 @@ void check_outputs(const RunArguments& arguments) {
   }
 }
 
-void check_start(const RunArguments& arguments) {
-  if (!arguments.load.empty() && randomness(arguments)) {
-    throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
+std::shared_ptr<const Model> model_of(const RunArguments& arguments) {
+  if (arguments.scene) return {arguments.scene, &arguments.scene->model};
+  return std::make_shared<const Model>(load_model(arguments.model, arguments.base));
+}
+
+/// Puts the simulation where the run is to begin.
+void begin_run(const RunArguments& arguments, Simulation& simulation) {
+  if (!arguments.load.empty()) return simulation.load(arguments.load);
+  InitialState state;
+  if (arguments.scene) {
+    state = arguments.scene->initial;
+  } else if (const auto random = randomness(arguments)) {
+    state = random_state(simulation.model(), random->seed, random->spread);
   }
+  if (!state.positions.empty()) simulation.set_positions(state.positions);
+  if (!state.velocities.empty()) simulation.set_velocities(state.velocities);
 }
 
 /// One run from its first sample to its files.
@@ -188,18 +200,12 @@ int run_command(const RunArguments& arguments) {
   const Clock::time_point begin = Clock::now();
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
-  check_start(arguments);
   check_outputs(arguments);
 
-  const auto model = std::make_shared<const Model>(load_model(arguments.model, arguments.base));
+  const std::shared_ptr<const Model> model = model_of(arguments);
   print_warnings(*model);
-  Simulation simulation(model, arguments.options);
-  if (!arguments.load.empty()) simulation.load(arguments.load);
-  if (const auto random = randomness(arguments)) {
-    const InitialState state = random_state(*model, random->seed, random->spread);
-    simulation.set_positions(state.positions);
-    simulation.set_velocities(state.velocities);
-  }
+  Simulation simulation(model, arguments.options, arguments.scene ? arguments.scene->effects : Effects());
+  begin_run(arguments, simulation);
 
   Execution run(arguments, simulation, steps);
   run.steps();

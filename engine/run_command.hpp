@@ -1,5 +1,5 @@
 // engine/run_command.hpp
-// `linden run`: simulates one model and writes what it was asked to.
+// `linden run`: simulates one model or scene and writes what it was asked to.
 //
 //   checks    options, outputs, model: all that can be wrong is found before the first step
 //   steps     energy is sampled after every step when recording and in runs of up to 20,000 steps, else about 20,000 times; the time
@@ -7,14 +7,17 @@
 //   writes    files appear whole or not at all. A run that fails or is interrupted leaves them valid up to its last good step.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "engine/motion_arguments.hpp"
+#include "engine/scene.hpp"
 
 namespace linden {
 
 struct RunArguments : MotionArguments {
   Options options;
+  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model. options and duration go over the scene's
   std::string record, json, plot, save, load;  // files; empty = none
 };
 

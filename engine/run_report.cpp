@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "engine/effects_text.hpp"
 #include "engine/load_model.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -13,11 +14,15 @@
 namespace linden {
 namespace {
 
+Effects effects_of(const RunArguments& arguments) { return arguments.scene ? arguments.scene->effects : Effects(); }
+
 std::string start_text(const RunArguments& arguments, const RunFigures& figures) {
   if (!arguments.load.empty()) return fmt::format("{}, at {:.6g} s", arguments.load, figures.begin);
   if (const auto random = randomness(arguments)) {
-    return fmt::format("random positions and speeds, seed {}, spread {:g}", random->seed, random->spread);
+    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "", random->seed,
+                       random->spread);
   }
+  if (arguments.scene) return "as the scene says";
   return "at rest in the zero configuration";
 }
 
@@ -48,7 +53,13 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
 
   row("model", model_text(arguments, model));
   row("start", start_text(arguments, figures));
-  if (const std::string left_out = LeftOut(model).text(); !left_out.empty()) row("ignored", left_out + "; runs know gravity only");
+  const Effects effects = effects_of(arguments);
+  std::string label = "effects";
+  for (const EffectLine& line : effect_lines(effects, model)) {
+    row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
+    label.clear();
+  }
+  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) row("ignored", left_out + "; a scene can name them");
   row("method", fmt::format("{}, step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), options.step,
                             options.tolerance, name(options.stop), name(options.guess), gravity_text(options)));
   if (figures.steps == 0) return text;
@@ -108,7 +119,10 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
   using Json = nlohmann::ordered_json;
   const auto if_any = [](bool any, double value) { return any && std::isfinite(value) ? Json(value) : Json(nullptr); };
   const auto if_given = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
-  const LeftOut left_out(model);
+  const Effects effects = effects_of(arguments);
+  const LeftOut left_out(model, effects);
+  Json effect_list = Json::array();
+  for (const EffectLine& line : effect_lines(effects, model)) effect_list.push_back({{"name", line.name}, {"on", line.where}, {"what", line.what}});
   const EnergyDrift& energy = figures.energy;
   return Json{
       {"command", "run"},
@@ -122,6 +136,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"velocities", model.tree.shape.velocities},
       {"mass", model.constants.subtree_mass(0)},
       {"ignored", {{"limits", left_out.limits}, {"damping", left_out.damping}, {"friction", left_out.friction}}},
+      {"effects", effect_list},
       {"solver", name(options.solver)},
       {"guess", name(options.guess)},
       {"stop", name(options.stop)},

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/instance_stepper.hpp"
+#include "engine/scene.hpp"
 #include "layout/input_error.hpp"
 
 namespace linden {
@@ -21,6 +22,11 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
   changed();
+}
+
+Simulation::Simulation(const Scene& scene) : Simulation(scene.model, scene.options, scene.effects) {
+  if (!scene.initial.positions.empty()) set_positions(scene.initial.positions);
+  if (!scene.initial.velocities.empty()) set_velocities(scene.initial.velocities);
 }
 
 void Simulation::check_row_count(const char* what, std::size_t found, Index expected) const {

@@ -21,6 +21,8 @@
 
 namespace linden {
 
+struct Scene;
+
 /// Of the whole system, about the world's origin and in the world's frame.
 struct Momentum {
   std::array<double, 3> angular{};  // [kg m^2/s]
@@ -32,6 +34,8 @@ class Simulation {
   /// At rest in the model's zero configuration. Throws InputError for options and effects that make no sense.
   explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
   explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
+  /// At the start of the scene (engine/scene.hpp).
+  explicit Simulation(const Scene& scene);
 
   const Model& model() const { return *model_; }
   const Options& options() const { return options_; }

@@ -13,14 +13,19 @@
 #include <array>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "layout/contacts.hpp"
 #include "layout/field.hpp"
+#include "layout/names.hpp"
 
 namespace linden {
 
-/// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend.
+struct Model;
+
+/// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend; where two
+/// are equal the number jumps.
 struct Course {
   std::vector<double> times{0};
   std::vector<double> values{0};
@@ -129,5 +134,38 @@ struct Effects {
   std::array<double, 3> wind{0, 0, 0};  // [m/s], world frame
   std::optional<Ground> ground;
 };
+
+/// First velocity row of a joint. Throws InputError, with the nearest name, where no such joint moves.
+Index row_of(const Model& model, const std::string& joint);
+
+/// Body of a link and the link's frame in it. Throws InputError, with the nearest name, where there is no such link.
+const LinkPlace& place_of(const Model& model, const std::string& link);
+
+/// What the robot's file says of its joints. A mimic joint's share is carried to the joint that leads it.
+std::vector<JointDamping> urdf_damping(const Model& model);
+std::vector<JointFriction> urdf_friction(const Model& model);
+std::vector<JointLimit> urdf_limits(const Model& model, double restitution = 0);
+
+/// The same on every joint: screws, for damping the rows of ball joints too. Mimic joints' shares are carried to their leaders.
+std::vector<Armature> armature_everywhere(const Model& model, double inertia);
+std::vector<JointDamping> damping_everywhere(const Model& model, double coefficient);
+std::vector<JointFriction> friction_everywhere(const Model& model, double force);
+
+/// On every screw joint that follows no other, no stronger than the file's effort limits, with `positions` [nq] for targets; empty: the
+/// zero configuration.
+std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping, const std::vector<double>& positions = {});
+
+/// Carries what stands on followers' rows to their leaders' (q_f = m q + o): inertia and damping times m^2, friction times |m|, limits
+/// through the map, the tighter ones and the smaller restitution where several meet. One entry a row is left, sorted by row. Throws
+/// InputError where limits leave no room.
+std::vector<Armature> on_leaders(const Model& model, const std::vector<Armature>& list);
+std::vector<JointDamping> on_leaders(const Model& model, const std::vector<JointDamping>& list);
+std::vector<JointFriction> on_leaders(const Model& model, const std::vector<JointFriction>& list);
+std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLimit>& list);
+
+/// Throws InputError where an effect names what is not there or cannot have it (a row out of range, a screw's effect on a ball or free
+/// joint or on a mimic joint's follower), holds a number that makes no sense, or meets another of its kind where there can be only one:
+/// friction, limits and servos.
+void check(const Effects& effects, const Model& model);
 
 }  // namespace linden

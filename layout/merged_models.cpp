@@ -1,0 +1,164 @@
+#include "layout/merged_models.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <tuple>
+#include <unordered_set>
+
+#include "layout/input_error.hpp"
+
+namespace linden {
+namespace {
+
+/// A body before and after.
+struct Origin {
+  std::size_t part;
+  Index slot;
+  Index level;
+  JointKind kind;
+};
+
+class Merger {
+ public:
+  Merger(const std::vector<PlacedModel>& parts, const std::string& name) : parts_(parts) { model_.names.model = name; }
+
+  Model run() {
+    if (parts_.empty()) throw InputError("no models to merge; expected one or more; add a model");
+    sort_bodies();
+    lay_out();
+    for (std::size_t part = 0; part < parts_.size(); ++part) add_names_of_all(part);
+    return std::move(model_);
+  }
+
+ private:
+  const Model& model_of(const Origin& origin) const { return parts_[origin.part].model; }
+  std::string prefixed(std::size_t part, const std::string& name) const {
+    return parts_[part].name.empty() ? name : parts_[part].name + "/" + name;
+  }
+  Index slot_of(std::size_t part, Index slot) const { return new_slot_[part][static_cast<std::size_t>(slot)]; }
+
+  void sort_bodies() {
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      const Tree& tree = parts_[part].model.tree;
+      if (!parts_[part].pose.matrix().allFinite()) {
+        throw InputError(fmt::format("the pose of model \"{}\" is not finite; expected numbers; check its position and rotation",
+                                     parts_[part].name));
+      }
+      new_slot_.emplace_back(static_cast<std::size_t>(tree.shape.slots), 0);
+      for (const Run& run : tree.runs) {
+        for (Index i = run.begin; i < run.end; ++i) order_.push_back({part, i, tree.level(i), run.kind});
+      }
+    }
+    std::ranges::stable_sort(order_, [](const Origin& a, const Origin& b) { return std::tie(a.level, a.kind) < std::tie(b.level, b.kind); });
+    for (std::size_t k = 0; k < order_.size(); ++k) {
+      new_slot_[order_[k].part][static_cast<std::size_t>(order_[k].slot)] = static_cast<Index>(k) + 1;
+    }
+  }
+
+  void lay_out() {
+    std::vector<Index> parent(1, 0);
+    std::vector<JointKind> kind(1, JointKind::screw);
+    for (const Origin& origin : order_) {
+      parent.push_back(slot_of(origin.part, model_of(origin).tree.parent(origin.slot)));
+      kind.push_back(origin.kind);
+    }
+    Tree& tree = model_.tree = Tree::from_sorted(parent, kind);
+    model_.constants.allocate(tree.shape);
+    model_.attributes.allocate(tree.shape);
+    for (int row = 0; row < 3; ++row) model_.constants.tree_placement(0, 4 * row) = 1;
+    model_.names.body.assign(1, "world");
+    model_.names.joint.assign(1, "");
+    for (std::size_t k = 0; k < order_.size(); ++k) add_body(order_[k], static_cast<Index>(k) + 1);
+    sum_subtree_masses(tree, model_.constants);
+  }
+
+  void add_body(const Origin& origin, Index slot) {
+    const Model& from = model_of(origin);
+    copy_rows(from.constants, model_.constants, origin.slot, slot, 1);
+    if (from.tree.parent(origin.slot) == 0) place_root(parts_[origin.part].pose, slot);
+    const Index old_v = from.tree.first_v(origin.slot), old_q = from.tree.first_q(origin.slot);
+    copy_rows(from.attributes, model_.attributes, old_v, model_.tree.first_v(slot), velocity_count(origin.kind));
+
+    Names& names = model_.names;
+    const auto at = static_cast<std::size_t>(origin.slot);
+    names.body.push_back(prefixed(origin.part, from.names.body[at]));
+    names.joint.push_back(prefixed(origin.part, from.names.joint[at]));
+    for (Index k = 0; k < position_count(origin.kind); ++k) {
+      add_coordinate(prefixed(origin.part, from.names.position[static_cast<std::size_t>(old_q + k)]));
+    }
+    for (Index k = 0; k < velocity_count(origin.kind); ++k) {
+      names.velocity.push_back(prefixed(origin.part, from.names.velocity[static_cast<std::size_t>(old_v + k)]));
+    }
+  }
+
+  /// Rows `from` on of every field of one structure to rows `to` on of another.
+  template <class Fields>
+  static void copy_rows(const Fields& source, Fields& target, Index from, Index to, Index count) {
+    std::vector<const double*> begins;
+    Fields::each(source, [&](const char*, const auto& field, Rows, const char*) { begins.push_back(field.flat().data()); });
+    std::size_t next = 0;
+    Fields::each(target, [&](const char*, auto& field, Rows, const char*) {
+      constexpr auto width = static_cast<Index>(std::remove_reference_t<decltype(field)>::components);
+      std::copy_n(begins[next++] + from * width, count * width, field.flat().data() + to * width);
+    });
+  }
+
+  void place_root(const Pose& pose, Index slot) {
+    BodyConstants<double>& constants = model_.constants;
+    Pose root = Pose::Identity();
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) root.linear()(row, column) = constants.tree_placement(slot, 3 * row + column);
+      root.translation()[row] = constants.tree_placement(slot, 9 + row);
+    }
+    const Pose placed = pose * root;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) constants.tree_placement(slot, 3 * row + column) = placed.linear()(row, column);
+      constants.tree_placement(slot, 9 + row) = placed.translation()[row];
+    }
+  }
+
+  void add_coordinate(const std::string& name) {
+    if (!coordinates_.insert(name).second) fail("coordinates", name);
+    model_.names.position.push_back(name);
+  }
+
+  void add_names_of_all(std::size_t part) {
+    const Model& from = parts_[part].model;
+    for (const auto& [link, place] : from.names.link) {
+      // what is fixed to the world moves with the model's idea of it
+      const Pose pose = place.slot == 0 ? parts_[part].pose * place.in_body : place.in_body;
+      const std::string name = prefixed(part, link);
+      if (!model_.names.link.emplace(name, LinkPlace{slot_of(part, place.slot), pose}).second) fail("links", name);
+    }
+    for (const auto& [joint, slot] : from.names.slot_of_joint) {
+      const std::string name = prefixed(part, joint);
+      if (!model_.names.slot_of_joint.emplace(name, slot_of(part, slot)).second) fail("joints", name);
+    }
+    for (const Mimic& mimic : from.mimics) {
+      const Index follower = slot_of(part, mimic.follower_slot), leader = slot_of(part, mimic.leader_slot);
+      const Tree& tree = model_.tree;
+      model_.mimics.push_back({follower, leader, tree.first_v(follower), tree.first_v(leader), tree.first_q(follower),
+                               tree.first_q(leader), mimic.multiplier, mimic.offset});
+    }
+    for (const std::string& warning : from.warnings) {
+      model_.warnings.push_back(parts_[part].name.empty() ? warning : parts_[part].name + ": " + warning);
+    }
+  }
+
+  [[noreturn]] static void fail(const char* what, const std::string& name) {
+    throw InputError(fmt::format("two {} are called \"{}\"; names must be unique; give each model a name of its own", what, name));
+  }
+
+  const std::vector<PlacedModel>& parts_;
+  std::vector<Origin> order_;
+  std::vector<std::vector<Index>> new_slot_;  // [part][slot]
+  std::unordered_set<std::string> coordinates_;
+  Model model_;
+};
+
+}  // namespace
+
+Model merged(const std::vector<PlacedModel>& parts, const std::string& name) { return Merger(parts, name).run(); }
+
+}  // namespace linden
