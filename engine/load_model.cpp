@@ -35,7 +35,7 @@ void require_memory(const std::string& what, double bytes) {
   const double present = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
   if (present <= 0 || bytes <= present) return;
   constexpr double kMost = 1e18;
-  throw InputError(fmt::format("{} {} about {} of memory, this machine has {}; choose fewer or a smaller one", what,
+  throw InputError(fmt::format("{} {} about {} of memory; expected no more than the {} of this machine; choose fewer or a smaller one", what,
                                what.find(' ') == what.npos ? "needs" : "need",
                                memory_text(static_cast<std::size_t>(std::min(bytes, kMost))),
                                memory_text(static_cast<std::size_t>(present))));

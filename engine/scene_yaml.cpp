@@ -162,6 +162,21 @@ void refuse_control_characters(const std::string& text, const std::string& file)
   }
 }
 
+int lines_of(const std::string& text) {
+  return std::max(1, static_cast<int>(std::ranges::count(text, '\n')) + (text.ends_with('\n') ? 0 : 1));
+}
+
+/// The first line from 1 to `last` that is indented by a tab; 0 where there is none.
+int line_with_tab(const std::string& text, int last) {
+  int line = 1;
+  for (std::size_t begin = 0; begin < text.size() && line <= last; ++line) {
+    const std::size_t content = std::min(text.find_first_not_of(" \t", begin), text.size());
+    if (text.find('\t', begin) < content) return line;
+    begin = std::min(text.find('\n', begin), text.size() - 1) + 1;
+  }
+  return 0;
+}
+
 std::string one_line(std::string text) {
   std::ranges::replace_if(text, [](unsigned char c) { return c < ' '; }, ' ');
   return text;
@@ -185,15 +200,19 @@ SceneYaml::SceneYaml(const std::string& text, std::string file) : file_(std::mov
             "put long tables into files of their own");
   }
   refuse_control_characters(text, file_);
-  std::istringstream stream(text);
+  // the end of a document ends what a missing quotation mark would let run on
+  std::istringstream stream(text + "\n...\n");
   Builder builder(file_);
   try {
     YAML::Parser parser(stream);
     while (parser.HandleNextDocument(builder)) continue;
   } catch (const YAML::Exception& error) {
-    const bool tab = error.msg.find("tab") != error.msg.npos;
-    fail_at(file_, std::max(error.mark.line, 0) + 1, "this is no YAML: " + one_line(error.msg), tab ? "spaces before a key" : "key: value",
-            tab ? "replace the tab by spaces" : "check indentation, colons, quotes and brackets here and above");
+    const int line = std::max(error.mark.line, 0) + 1;
+    if (const int tab = line_with_tab(text, line); tab > 0) {
+      fail_at(file_, tab, "this is no YAML: a tab begins the line", "spaces before a key", "replace the tab by spaces");
+    }
+    fail_at(file_, std::min(line, lines_of(text)), "this is no YAML: " + one_line(error.msg), "key: value",
+            "check indentation, colons, quotes and brackets here and above");
   }
   root_ = builder.root();
   if (!root_ || root_->kind == Kind::nothing) fail_at(file_, 1, "the file is empty", "a scene", "begin with model: and a file or chain:3");

@@ -116,8 +116,8 @@ struct Ground {
   double stiffness = 1e5;                 // of one contact point [N/m]
   double damping = 0;                     // of one contact point along the normal [N s/m]
   double friction = 0.8;                  // Coulomb's coefficient
-  std::optional<HeightField> terrain;
-  Contacts contacts;
+  std::optional<HeightField> terrain{};
+  Contacts contacts{};
 };
 
 struct Effects {

@@ -212,7 +212,7 @@ Model generate(const std::string& name) {
   Index count = 0;
   const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
   if (error != std::errc{} || end != number.data() + number.size() || count < 1 || count > kMostBodies) {
-    throw InputError(fmt::format("model \"{}\": \"{}\" is no number of bodies from 1 to {}; write for example chain:100", name, number,
+    throw InputError(fmt::format("model \"{}\": \"{}\" is no number of bodies; expected 1 to {}; write for example chain:100", name, number,
                                  kMostBodies));
   }
   if (kind == "chain") return chain(count);
@@ -221,8 +221,8 @@ Model generate(const std::string& name) {
   if (kind == "tree") return balanced_tree(count);
   if (kind == "random") return random_tree({.bodies = count});
   if (kind == "humanoids") return humanoids(count);
-  throw InputError(fmt::format("model \"{}\": \"{}\" cannot be generated; choose chain, ball-chain, paper-chain, tree, random or "
-                               "humanoids, or give a URDF file",
+  throw InputError(fmt::format("model \"{}\": \"{}\" cannot be generated; expected chain, ball-chain, paper-chain, tree, random or "
+                               "humanoids; choose one, or give a URDF file",
                                name, kind));
 }
 

@@ -1,0 +1,156 @@
+#include "layout/merged_models.hpp"
+
+#include <catch2/catch.hpp>
+#include <numbers>
+
+#include "layout/builder.hpp"
+#include "layout/urdf.hpp"
+#include "models/generators.hpp"
+
+using namespace linden;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const std::string kArm = LINDEN_MODELS_DIR "/arm.urdf";
+const std::string kHand = LINDEN_MODELS_DIR "/hand.urdf";
+const std::string kHumanoid = LINDEN_MODELS_DIR "/humanoid.urdf";
+
+Pose placed(double x, double y, double turn) {
+  Pose pose = Pose::Identity();
+  pose.translation() = Eigen::Vector3d(x, y, 0.3);
+  pose.linear() = Eigen::AngleAxisd(turn, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix();
+  return pose;
+}
+
+Pose placement(const Model& model, Index slot) {
+  Pose pose = Pose::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
+    pose.translation()[row] = model.constants.tree_placement(slot, 9 + row);
+  }
+  return pose;
+}
+
+/// Everything of `part` is in `whole`, under its name and in its place.
+void check_is_in(const PlacedModel& part, const Model& whole) {
+  const Model& model = part.model;
+  const std::string prefix = part.name.empty() ? "" : part.name + "/";
+  std::vector<Index> slot_of(static_cast<std::size_t>(model.tree.shape.slots), 0);
+  for (Index i = 1; i < model.tree.shape.slots; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    INFO(part.name << " " << model.names.joint[at]);
+    const auto found = std::ranges::find(whole.names.joint, prefix + model.names.joint[at]);
+    REQUIRE(found != whole.names.joint.end());
+    const auto slot = static_cast<Index>(found - whole.names.joint.begin());
+    slot_of[at] = slot;
+    CHECK(whole.names.body[static_cast<std::size_t>(slot)] == prefix + model.names.body[at]);
+    CHECK(whole.tree.kind(slot) == model.tree.kind(i));
+    CHECK(whole.tree.parent(slot) == slot_of[static_cast<std::size_t>(model.tree.parent(i))]);
+    for (int k = 0; k < 10; ++k) CHECK(whole.constants.inertia(slot, k) == model.constants.inertia(i, k));
+    for (int k = 0; k < 2; ++k) CHECK(whole.constants.screw(slot, k) == model.constants.screw(i, k));
+    CHECK(whole.constants.subtree_mass(slot) == Approx(model.constants.subtree_mass(i)));
+    const Pose expected = model.tree.parent(i) == 0 ? Pose(part.pose * placement(model, i)) : placement(model, i);
+    CHECK(placement(whole, slot).matrix().isApprox(expected.matrix(), 1e-15));
+    for (Index k = 0; k < velocity_count(model.tree.kind(i)); ++k) {
+      const Index from = model.tree.first_v(i) + k, to = whole.tree.first_v(slot) + k;
+      CHECK(whole.names.velocity[static_cast<std::size_t>(to)] == prefix + model.names.velocity[static_cast<std::size_t>(from)]);
+      CHECK(whole.attributes.lower(to) == model.attributes.lower(from));
+      CHECK(whole.attributes.upper(to) == model.attributes.upper(from));
+      CHECK(whole.attributes.max_effort(to) == model.attributes.max_effort(from));
+      CHECK(whole.attributes.max_velocity(to) == model.attributes.max_velocity(from));
+      CHECK(whole.attributes.damping(to) == model.attributes.damping(from));
+      CHECK(whole.attributes.friction(to) == model.attributes.friction(from));
+    }
+    for (Index k = 0; k < position_count(model.tree.kind(i)); ++k) {
+      CHECK(whole.names.position[static_cast<std::size_t>(whole.tree.first_q(slot) + k)] ==
+            prefix + model.names.position[static_cast<std::size_t>(model.tree.first_q(i) + k)]);
+    }
+  }
+  for (const auto& [link, place] : model.names.link) {
+    const LinkPlace& found = whole.names.link.at(prefix + link);
+    CHECK(found.slot == slot_of[static_cast<std::size_t>(place.slot)]);
+    const Pose expected = place.slot == 0 ? Pose(part.pose * place.in_body) : place.in_body;
+    CHECK(found.in_body.matrix().isApprox(expected.matrix(), 1e-15));
+  }
+  for (const auto& [joint, slot] : model.names.slot_of_joint) {
+    CHECK(whole.names.slot_of_joint.at(prefix + joint) == slot_of[static_cast<std::size_t>(slot)]);
+  }
+  for (const Mimic& mimic : model.mimics) {
+    const Index follower = slot_of[static_cast<std::size_t>(mimic.follower_slot)], leader = slot_of[static_cast<std::size_t>(mimic.leader_slot)];
+    const auto found = std::ranges::find(whole.mimics, follower, &Mimic::follower_slot);
+    REQUIRE(found != whole.mimics.end());
+    CHECK(found->leader_slot == leader);
+    CHECK(found->follower_q == whole.tree.first_q(follower));
+    CHECK(found->leader_q == whole.tree.first_q(leader));
+    CHECK(found->follower_v == whole.tree.first_v(follower));
+    CHECK(found->leader_v == whole.tree.first_v(leader));
+    CHECK(found->multiplier == mimic.multiplier);
+    CHECK(found->offset == mimic.offset);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("merged models keep their bodies, names, attributes and mimic joints", "[merged models]") {
+  const std::vector<PlacedModel> parts{{load_urdf(kHand), "hand", placed(1, 2, 0.4)},
+                                       {load_urdf(kHumanoid, Base::floating), "walker", placed(-1, 0, 1)},
+                                       {load_urdf(kArm), "", Pose::Identity()},
+                                       {random_tree({.bodies = 40}), "random", placed(0, 5, -2)},
+                                       {load_urdf(kHand), "other hand", placed(3, 0, 0)}};
+  const Model whole = merged(parts, "crowd");
+  CHECK(whole.names.model == "crowd");
+  Index bodies = 0, positions = 0;
+  double mass = 0;
+  std::size_t mimics = 0;
+  for (const PlacedModel& part : parts) {
+    check_is_in(part, whole);
+    bodies += part.model.tree.bodies();
+    positions += part.model.tree.shape.positions;
+    mass += part.model.constants.subtree_mass(0);
+    mimics += part.model.mimics.size();
+  }
+  CHECK(whole.tree.bodies() == bodies);
+  CHECK(whole.tree.shape.positions == positions);
+  CHECK(whole.mimics.size() == mimics);
+  REQUIRE(mimics > 0);
+  CHECK(whole.constants.subtree_mass(0) == Approx(mass));
+  for (Index i = 2; i < whole.tree.shape.slots; ++i) {
+    CHECK(whole.tree.parent(i) < i);
+    CHECK(whole.tree.level(i) >= whole.tree.level(i - 1));
+    if (whole.tree.level(i) == whole.tree.level(i - 1)) CHECK(whole.tree.kind(i) >= whole.tree.kind(i - 1));
+  }
+}
+
+TEST_CASE("one model merged with nothing is itself", "[merged models]") {
+  for (const Model& model : {load_urdf(kHand), random_tree({.bodies = 30}), humanoids(2)}) {
+    const Model same = merged({{model, "", Pose::Identity()}}, model.names.model);
+    CHECK(same.hash() == model.hash());
+    CHECK(same.names.position == model.names.position);
+    CHECK(same.names.velocity == model.names.velocity);
+  }
+}
+
+TEST_CASE("warnings of merged models say whose they are", "[merged models]") {
+  TreeBuilder builder("w");
+  LinkSpec link;
+  link.name = "a";
+  link.joint = "j";
+  link.inertia = box_inertia(1, {1, 1, 1}, {0, 0, 0});
+  builder.add(link).warn("a grain of salt");
+  const Model whole = merged({{builder.build(), "left", Pose::Identity()}, {chain(2), "right", Pose::Identity()}}, "two");
+  CHECK(whole.warnings == std::vector<std::string>{"left: a grain of salt"});
+}
+
+TEST_CASE("models whose names meet are not merged", "[merged models]") {
+  const auto attempt = [](const std::string& a, const std::string& b) {
+    return merged({{chain(2), a, Pose::Identity()}, {chain(3), b, Pose::Identity()}}, "two");
+  };
+  CHECK_THROWS_WITH(attempt("", ""), Contains("two coordinates are called \"joint1\"") && Contains("a name of its own"));
+  CHECK_THROWS_AS(attempt("a", "a"), InputError);
+  CHECK_NOTHROW(attempt("", "a"));
+  CHECK_THROWS_AS(merged({}, "none"), InputError);
+  Pose broken = Pose::Identity();
+  broken.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_WITH(merged({{chain(2), "a", broken}}, "one"), Contains("not finite"));
+}
