@@ -55,7 +55,8 @@ std::string unit_text(const std::vector<Entry>& list, const Model& model, const 
     for (Index i = run.begin; i < run.end; ++i) {
       const Index first = model.tree.first_v(i);
       const bool slide = run.kind == JointKind::screw && model.constants.screw(i, 0) == 0;
-      const bool named = std::ranges::any_of(list, [&](const Entry& entry) { return entry.row >= first && entry.row < first + velocity_count(run.kind); });
+      const bool named = std::ranges::any_of(
+          list, [&](const Entry& entry) { return entry.row >= first && entry.row < first + velocity_count(run.kind); });
       if (named) (slide ? slides : turns) = true;
     }
   }
@@ -70,7 +71,9 @@ Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : 
 
 std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model) {
   std::vector<EffectLine> lines;
-  const auto add = [&](const char* name, std::string where, std::string what) { lines.push_back({name, std::move(where), std::move(what)}); };
+  const auto add = [&](const char* name, std::string where, std::string what) {
+    lines.push_back({name, std::move(where), std::move(what)});
+  };
   const auto on_joints = [&](const char* name, const auto& list, const auto& what) {
     if (!list.empty()) add(name, counted(joints_of(list, model), "joint"), what());
   };
@@ -100,17 +103,22 @@ std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model)
   on_joints("servo", effects.servos, [&] {
     return fmt::format("stiffness {} {}, damping {} {}, force {} {}",
                        range_text(effects.servos, [](const Servo& entry) { return entry.stiffness; }),
-                       unit_text(effects.servos, model, "N m/rad", "N/m"), range_text(effects.servos, [](const Servo& entry) { return entry.damping; }),
+                       unit_text(effects.servos, model, "N m/rad", "N/m"),
+                       range_text(effects.servos, [](const Servo& entry) { return entry.damping; }),
                        unit_text(effects.servos, model, "N m s/rad", "N s/m"),
-                       range_text(effects.servos, [](const Servo& entry) { return entry.max_force; }), unit_text(effects.servos, model, "N m", "N"));
+                       range_text(effects.servos, [](const Servo& entry) { return entry.max_force; }),
+                       unit_text(effects.servos, model, "N m", "N"));
   });
   on_joints("torque", effects.torques, [&] {
-    const auto tables = std::ranges::count_if(effects.torques, [](const JointTorque& entry) { return entry.force.times.size() > 1; });
+    const auto tables =
+        std::ranges::count_if(effects.torques, [](const JointTorque& entry) { return entry.force.times.size() > 1; });
     return tables == 0 ? std::string("constant") : fmt::format("{} over time", tables);
   });
   if (!effects.wrenches.empty()) {
-    add("wrench", counted(bodies_of(effects.wrenches), "body"),
-        range_text(effects.wrenches, [](const BodyWrench& entry) { return std::hypot(entry.force[0], entry.force[1], entry.force[2]); }) + " N");
+    add("wrench", counted(bodies_of(effects.wrenches), "body"), range_text(effects.wrenches, [](const BodyWrench& entry) {
+                                                                  return std::hypot(entry.force[0], entry.force[1],
+                                                                                    entry.force[2]);
+                                                                }) + " N");
   }
   if (!effects.drag.empty()) {
     add("drag", counted(bodies_of(effects.drag), "body"),
@@ -120,9 +128,10 @@ std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model)
   }
   if (effects.ground) {
     const Ground& ground = *effects.ground;
-    add("ground", ground.terrain ? fmt::format("{} x {} heights", ground.terrain->columns, ground.terrain->rows) : std::string("plane"),
-        fmt::format("normal {}, height {:g} m, stiffness {:g} N/m, damping {:g} N s/m, friction {:g}; {}", vector_text(ground.normal), ground.height,
-                    ground.stiffness, ground.damping, ground.friction,
+    add("ground",
+        ground.terrain ? fmt::format("{} x {} heights", ground.terrain->columns, ground.terrain->rows) : std::string("plane"),
+        fmt::format("normal {}, height {:g} m, stiffness {:g} N/m, damping {:g} N s/m, friction {:g}; {}",
+                    vector_text(ground.normal), ground.height, ground.stiffness, ground.damping, ground.friction,
                     counted(static_cast<std::int64_t>(ground.contacts.spheres.size() + ground.contacts.rims.size()), "contact")));
   }
   return lines;
@@ -137,20 +146,32 @@ Json effects_json(const Effects& effects, const Model& model) {
   };
   const auto course = [](const Course& c) { return Json{{"times", c.times}, {"values", c.values}}; };
   list("armature", effects.armature, [&](const Armature& e) { return Json{{"joint", joint(e.row)}, {"inertia", e.inertia}}; });
-  list("damping", effects.damping, [&](const JointDamping& e) { return Json{{"joint", joint(e.row)}, {"coefficient", e.coefficient}}; });
+  list("damping", effects.damping, [&](const JointDamping& e) {
+    return Json{{"joint", joint(e.row)}, {"coefficient", e.coefficient}};
+  });
   list("friction", effects.friction, [&](const JointFriction& e) { return Json{{"joint", joint(e.row)}, {"force", e.force}}; });
-  list("spring", effects.springs, [&](const JointSpring& e) { return Json{{"joint", joint(e.row)}, {"stiffness", e.stiffness}, {"rest", e.rest}}; });
+  list("spring", effects.springs, [&](const JointSpring& e) {
+    return Json{{"joint", joint(e.row)}, {"stiffness", e.stiffness}, {"rest", e.rest}};
+  });
   list("spring", effects.ball_springs, [&](const BallSpring& e) {
     return Json{{"joint", model.names.joint[static_cast<std::size_t>(e.slot)]}, {"stiffness", e.stiffness}, {"rest", e.rest}};
   });
   list("limits", effects.limits, [&](const JointLimit& e) {
-    return Json{{"joint", joint(e.row)}, {"lower", number_or_null(e.lower)}, {"upper", number_or_null(e.upper)}, {"restitution", e.restitution}};
+    return Json{{"joint", joint(e.row)},
+                {"lower", number_or_null(e.lower)},
+                {"upper", number_or_null(e.upper)},
+                {"restitution", e.restitution}};
   });
   list("servo", effects.servos, [&](const Servo& e) {
-    return Json{{"joint", joint(e.row)},     {"stiffness", e.stiffness}, {"damping", e.damping},
-                {"target", e.target}, {"max_force", number_or_null(e.max_force)}};
+    return Json{{"joint", joint(e.row)},
+                {"stiffness", e.stiffness},
+                {"damping", e.damping},
+                {"target", e.target},
+                {"max_force", number_or_null(e.max_force)}};
   });
-  list("torque", effects.torques, [&](const JointTorque& e) { return Json{{"joint", joint(e.row)}, {"force", course(e.force)}}; });
+  list("torque", effects.torques, [&](const JointTorque& e) {
+    return Json{{"joint", joint(e.row)}, {"force", course(e.force)}};
+  });
   list("wrench", effects.wrenches, [&](const BodyWrench& e) {
     return Json{{"body", body(e.slot)},
                 {"point", e.point},
@@ -161,12 +182,15 @@ Json effects_json(const Effects& effects, const Model& model) {
                 {"to", number_or_null(e.to)},
                 {"scale", course(e.scale)}};
   });
-  list("drag", effects.drag, [&](const Drag& e) { return Json{{"body", body(e.slot)}, {"linear", e.linear}, {"quadratic", e.quadratic}}; });
+  list("drag", effects.drag, [&](const Drag& e) {
+    return Json{{"body", body(e.slot)}, {"linear", e.linear}, {"quadratic", e.quadratic}};
+  });
   if (!effects.drag.empty()) result["wind"] = effects.wind;
   if (effects.ground) {
     const Ground& g = *effects.ground;
-    result["ground"] = Json{{"normal", g.normal},   {"height", g.height},     {"stiffness", g.stiffness},
-                            {"damping", g.damping}, {"friction", g.friction}, {"contacts", g.contacts.spheres.size() + g.contacts.rims.size()}};
+    result["ground"] =
+        Json{{"normal", g.normal},   {"height", g.height},     {"stiffness", g.stiffness},
+             {"damping", g.damping}, {"friction", g.friction}, {"contacts", g.contacts.spheres.size() + g.contacts.rims.size()}};
     if (g.terrain) {
       result["ground"]["terrain"] = Json{{"columns", g.terrain->columns},
                                          {"rows", g.terrain->rows},

@@ -168,7 +168,9 @@ class Printer {
     fmt::print("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
     const auto& g = arguments_.options.gravity;
     if (g != std::array<double, 3>{0, 0, 0}) fmt::print("  {:<9} {:g} {:g} {:g} m/s^2\n", "gravity", g[0], g[1], g[2]);
-    for (const EffectLine& line : effect_lines(scene.effects, model_)) fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
+    for (const EffectLine& line : effect_lines(scene.effects, model_)) {
+      fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
+    }
   }
 
   void table() const {

@@ -240,7 +240,8 @@ CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling
 }
 
 CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
-  CLI::App* command = program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
+  CLI::App* command =
+      program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
   const Adding add{command};
   add.model(inspect.model, kSceneHelp);
   add.base("Options", texts);

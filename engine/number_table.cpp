@@ -27,7 +27,8 @@ std::string_view trimmed(std::string_view text) {
 std::string read_text(const std::string& file, const std::string& what, std::size_t most_bytes) {
   std::error_code ignored;
   const std::filesystem::file_status status = std::filesystem::status(file, ignored);
-  if (!std::filesystem::exists(status)) throw InputError(fmt::format("{}: there is no such file; expected {}; check the path", file, what));
+  if (!std::filesystem::exists(status))
+    throw InputError(fmt::format("{}: there is no such file; expected {}; check the path", file, what));
   if (std::filesystem::is_directory(status)) {
     throw InputError(fmt::format("{}: this is a folder; expected {}; name a file in it", file, what));
   }
@@ -41,7 +42,8 @@ std::string read_text(const std::string& file, const std::string& what, std::siz
     stream.read(text.data() + before, kChunk);
     text.resize(before + static_cast<std::size_t>(stream.gcount()));
     if (text.size() > most_bytes) {
-      throw InputError(fmt::format("{}: it is longer than {} bytes; expected {}; check that it is the right file", file, most_bytes, what));
+      throw InputError(
+          fmt::format("{}: it is longer than {} bytes; expected {}; check that it is the right file", file, most_bytes, what));
     }
   }
   return text;
@@ -77,8 +79,8 @@ NumberTable read_numbers(const std::string& file, std::size_t columns, std::size
     if (header) continue;
     const std::size_t expected = columns > 0 ? columns : table.rows.empty() ? words.size() : table.rows.front().size();
     if (words.size() != expected || words.size() < least_columns) {
-      fail(fmt::format("{} numbers", words.size()), fmt::format("{} in every row, commas between", std::max(expected, least_columns)),
-           "add or remove some");
+      fail(fmt::format("{} numbers", words.size()),
+           fmt::format("{} in every row, commas between", std::max(expected, least_columns)), "add or remove some");
     }
     if (row.size() != words.size()) {
       const auto wrong = std::ranges::find_if(words, [](std::string_view word) { return !number_in(word); });
@@ -87,7 +89,8 @@ NumberTable read_numbers(const std::string& file, std::size_t columns, std::size
     table.rows.push_back(std::move(row));
     table.lines.push_back(line);
   }
-  if (table.rows.empty()) throw InputError(fmt::format("{}: it holds no numbers; expected rows of them; check that it is the right file", file));
+  if (table.rows.empty())
+    throw InputError(fmt::format("{}: it holds no numbers; expected rows of them; check that it is the right file", file));
   return table;
 }
 

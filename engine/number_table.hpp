@@ -1,6 +1,6 @@
 // engine/number_table.hpp
-// Numbers from a CSV file: a line a row, commas between, all rows as wide as the first. Empty lines and lines that begin with # are
-// passed over; a first line that holds no number is a header.
+// Numbers from a CSV file: a line a row, commas between, all rows as wide as the first. Empty lines and lines that begin with #
+// are passed over; a first line that holds no number is a header.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ struct NumberTable {
   std::vector<int> lines;  // of each row in the file
 };
 
-/// A file with as many columns, any number from `least_columns` up where `columns` is 0. Throws InputError: `file:line: what was found;
-/// what was expected; what to do`.
+/// A file with as many columns, any number from `least_columns` up where `columns` is 0. Throws InputError: `file:line: what was
+/// found; what was expected; what to do`.
 NumberTable read_numbers(const std::string& file, std::size_t columns, std::size_t least_columns = 1);
 
 /// All of a file, of at most `most_bytes`. `what` says in messages what it should be. Throws InputError.

@@ -19,8 +19,8 @@ Effects effects_of(const RunArguments& arguments) { return arguments.scene ? arg
 std::string start_text(const RunArguments& arguments, const RunFigures& figures) {
   if (!arguments.load.empty()) return fmt::format("{}, at {:.6g} s", arguments.load, figures.begin);
   if (const auto random = randomness(arguments)) {
-    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "", random->seed,
-                       random->spread);
+    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "",
+                       random->seed, random->spread);
   }
   if (arguments.scene) return "as the scene says";
   return "at rest in the zero configuration";
@@ -59,7 +59,9 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
     row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
     label.clear();
   }
-  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) row("ignored", left_out + "; a scene can name them");
+  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) {
+    row("ignored", left_out + "; a scene can name them");
+  }
   row("method", fmt::format("{}, step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), options.step,
                             options.tolerance, name(options.stop), name(options.guess), gravity_text(options)));
   if (figures.steps == 0) return text;
@@ -122,7 +124,9 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
   const Effects effects = effects_of(arguments);
   const LeftOut left_out(model, effects);
   Json effect_list = Json::array();
-  for (const EffectLine& line : effect_lines(effects, model)) effect_list.push_back({{"name", line.name}, {"on", line.where}, {"what", line.what}});
+  for (const EffectLine& line : effect_lines(effects, model)) {
+    effect_list.push_back({{"name", line.name}, {"on", line.where}, {"what", line.what}});
+  }
   const EnergyDrift& energy = figures.energy;
   return Json{
       {"command", "run"},

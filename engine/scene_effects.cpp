@@ -46,10 +46,15 @@ struct NamedJoint {
 class Reader {
  public:
   Reader(const Model& model, const std::vector<double>& start, std::string folder)
-      : model_(model), start_(start), folder_(std::move(folder)), slot_of_row_(static_cast<std::size_t>(model.tree.shape.velocities)) {
+      : model_(model),
+        start_(start),
+        folder_(std::move(folder)),
+        slot_of_row_(static_cast<std::size_t>(model.tree.shape.velocities)) {
     for (const Run& run : model.tree.runs) {
       for (Index i = run.begin; i < run.end; ++i) {
-        for (Index k = 0; k < velocity_count(run.kind); ++k) slot_of_row_[static_cast<std::size_t>(model.tree.first_v(i) + k)] = {i, run.kind};
+        for (Index k = 0; k < velocity_count(run.kind); ++k) {
+          slot_of_row_[static_cast<std::size_t>(model.tree.first_v(i) + k)] = {i, run.kind};
+        }
       }
     }
     for (const Mimic& mimic : model.mimics) leader_of_[mimic.follower_slot] = mimic.leader_slot;
@@ -86,7 +91,8 @@ class Reader {
   NamedJoint joint(const SceneValue& at, const std::string& name) const {
     const Index row = at.located([&] { return row_of(model_, name); });
     const auto [slot, kind] = slot_of_row_[static_cast<std::size_t>(row)];
-    if (kind == JointKind::free) at.fail(fmt::format("joint {} is a free joint", linden::quoted(name)), "a joint that turns or slides", "leave it out");
+    if (kind == JointKind::free)
+      at.fail(fmt::format("joint {} is a free joint", linden::quoted(name)), "a joint that turns or slides", "leave it out");
     return {slot, row, model_.tree.first_q(slot), kind};
   }
   NamedJoint screw(const SceneValue& at, const std::string& name) const {
@@ -107,7 +113,8 @@ class Reader {
 
   LinkPlace body(const SceneValue& at, const std::string& link) const {
     const LinkPlace place = at.located([&] { return place_of(model_, link); });
-    if (place.slot == 0) at.fail(fmt::format("link {} is fixed to the world", linden::quoted(link)), "a link that moves", "leave it out");
+    if (place.slot == 0)
+      at.fail(fmt::format("link {} is fixed to the world", linden::quoted(link)), "a link that moves", "leave it out");
     return place;
   }
 
@@ -121,11 +128,13 @@ class Reader {
 
   void armature(const SceneValue& at) {
     std::vector<Armature>& list = result_.effects.armature;
-    if (at.says("urdf")) at.refuse("a number or {joint: number}", "URDF files say nothing of rotors: give a number, such as 0.01");
+    if (at.says("urdf"))
+      at.refuse("a number or {joint: number}", "URDF files say nothing of rotors: give a number, such as 0.01");
     if (at.is(Kind::text)) {
       list = armature_everywhere(model_, at.not_negative("a number or {joint: number}"));
     } else {
-      for (const Entry& entry : at.entries("a number or {joint: number}")) list.push_back({screw(entry).row, entry.value.not_negative()});
+      for (const Entry& entry : at.entries("a number or {joint: number}"))
+        list.push_back({screw(entry).row, entry.value.not_negative()});
       list = on_leaders(model_, list);
     }
     if (list.empty()) warn("no joint has any");
@@ -167,7 +176,8 @@ class Reader {
       refuse_follower(entry.value, found);
       entry.value.entries_of(kSpring);
       const auto stiffness = entry.value.find("stiffness"), rest = entry.value.find("rest");
-      if (!stiffness) entry.value.fail(entry.value.path() + " has no stiffness", "stiffness and, where it is not 0, rest", "add stiffness");
+      if (!stiffness)
+        entry.value.fail(entry.value.path() + " has no stiffness", "stiffness and, where it is not 0, rest", "add stiffness");
       if (found.kind == JointKind::screw) {
         result_.effects.springs.push_back({found.row, stiffness->not_negative(), rest ? rest->number() : 0});
       } else {
@@ -207,10 +217,12 @@ class Reader {
       if (const auto value = at.find("restitution")) result.restitution = restitution_of(*value);
     }
     if (!std::isfinite(result.lower) && !std::isfinite(result.upper)) {
-      at.fail(fmt::format("{} has no limit and the model's file gives none", at.path()), "lower, upper or both", "add them, or leave the joint out");
+      at.fail(fmt::format("{} has no limit and the model's file gives none", at.path()), "lower, upper or both",
+              "add them, or leave the joint out");
     }
     if (result.lower > result.upper) {
-      at.fail(fmt::format("{} goes from {} to {}", at.path(), result.lower, result.upper), "lower at or below upper", "exchange them");
+      at.fail(fmt::format("{} goes from {} to {}", at.path(), result.lower, result.upper), "lower at or below upper",
+              "exchange them");
     }
     return result;
   }
@@ -224,7 +236,8 @@ class Reader {
 
   void servo(const SceneValue& at) {
     at.entries_of(kServo);
-    const auto stiffness = at.find("stiffness"), damping = at.find("damping"), force = at.find("max_force"), joints = at.find("joints");
+    const auto stiffness = at.find("stiffness"), damping = at.find("damping"), force = at.find("max_force"),
+               joints = at.find("joints");
     const double shared_damping = damping ? damping->not_negative() : 0;
     std::map<Index, Servo> servos;
     const auto add = [&](const SceneValue& place, const NamedJoint& joint) {
@@ -235,7 +248,8 @@ class Reader {
       servos.emplace(joint.row, servo);
     };
     const auto require_stiffness = [&](const SceneValue& place) {
-      if (!stiffness) place.fail(place.path() + " has no stiffness", "one for all its joints, or one a joint", "add stiffness: number");
+      if (!stiffness)
+        place.fail(place.path() + " has no stiffness", "one for all its joints, or one a joint", "add stiffness: number");
     };
     if (!joints || (joints->is(Kind::map) && stiffness)) {
       require_stiffness(at);
@@ -264,9 +278,12 @@ class Reader {
         const NamedJoint named = screw(entry);
         refuse_follower(entry.value, named);
         const auto found = servos.find(named.row);
-        if (found == servos.end()) entry.value.fail(fmt::format("joint {} has no servo", linden::quoted(entry.key)), "a joint that has one", "add it to joints");
+        if (found == servos.end())
+          entry.value.fail(fmt::format("joint {} has no servo", linden::quoted(entry.key)), "a joint that has one",
+                           "add it to joints");
         if (joints && joints->is(Kind::map)) {
-          if (const auto own = joints->find(entry.key); own && own->find("target")) entry.value.refuse("one target a joint", "leave one out");
+          if (const auto own = joints->find(entry.key); own && own->find("target"))
+            entry.value.refuse("one target a joint", "leave one out");
         }
         found->second.target = entry.value.number();
       }
@@ -310,7 +327,8 @@ class Reader {
     }
     at.entries_of(kCourse);
     const auto times = at.find("times"), values = at.find("values");
-    if (!times || !values) at.fail(fmt::format("{} has no {}", at.path(), times ? "values" : "times"), "times and values", "add a list");
+    if (!times || !values)
+      at.fail(fmt::format("{} has no {}", at.path(), times ? "values" : "times"), "times and values", "add a list");
     Course result{times->numbers(), values->numbers()};
     if (result.times.empty() || result.times.size() != result.values.size()) {
       values->fail(fmt::format("{} has {} times and {} values", at.path(), result.times.size(), result.values.size()),
@@ -318,7 +336,8 @@ class Reader {
     }
     for (std::size_t k = 1; k < result.times.size(); ++k) {
       if (result.times[k] < result.times[k - 1]) {
-        times->fail(fmt::format("time {} s comes after {} s", result.times[k], result.times[k - 1]), "times that ascend", "sort them");
+        times->fail(fmt::format("time {} s comes after {} s", result.times[k], result.times[k - 1]), "times that ascend",
+                    "sort them");
       }
     }
     return result;
@@ -331,8 +350,8 @@ class Reader {
     for (std::size_t k = 0; k < table.rows.size(); ++k) {
       const double time = table.rows[k][0];
       if (k > 0 && time < result.times.back()) {
-        at.fail(fmt::format("{}:{}: time {} s comes after {} s", file, table.lines[k], time, result.times.back()), "times that ascend",
-                "sort its lines");
+        at.fail(fmt::format("{}:{}: time {} s comes after {} s", file, table.lines[k], time, result.times.back()),
+                "times that ascend", "sort its lines");
       }
       result.times.push_back(time);
       result.values.push_back(table.rows[k][1]);
@@ -358,7 +377,8 @@ class Reader {
       const auto value = at.find(key);
       return value ? vector_of(value->vector(expected)) : Vector3d(Vector3d::Zero());
     };
-    if (!at.find("force") && !at.find("moment")) at.fail(at.path() + " has neither force nor moment", "one of them or both", "add force: [x, y, z]");
+    if (!at.find("force") && !at.find("moment"))
+      at.fail(at.path() + " has neither force nor moment", "one of them or both", "add force: [x, y, z]");
     BodyWrench result{.slot = place.slot};
     const Vector3d force = vector_at("force", "[x, y, z] in N"), moment = vector_at("moment", "[x, y, z] in N m");
     const Vector3d point = place.in_body * vector_at("point", "[x, y, z] in m");
@@ -368,7 +388,8 @@ class Reader {
     result.moment = array_of(result.in_world ? moment : Vector3d(place.in_body.linear() * moment));
     if (const auto value = at.find("from")) result.from = value->number();
     if (const auto value = at.find("to")) result.to = value->number();
-    if (result.from > result.to) at.fail(fmt::format("{} goes from {} to {} s", at.path(), result.from, result.to), "from at or before to", "exchange them");
+    if (result.from > result.to)
+      at.fail(fmt::format("{} goes from {} to {} s", at.path(), result.from, result.to), "from at or before to", "exchange them");
     if (const auto file = at.find("file")) result.scale = course_of_file(*file);
     return result;
   }
@@ -392,10 +413,13 @@ class Reader {
       for (const Entry& entry : bodies->entries("{link: {linear, quadratic}}")) {
         const Index slot = body(entry.value, entry.key).slot;
         entry.value.entries_of(kBodyDrag);
-        if (!has_mass(slot)) entry.value.fail(fmt::format("the body of link {} has no mass", linden::quoted(entry.key)), "one that drag can act on", "leave it out");
+        if (!has_mass(slot))
+          entry.value.fail(fmt::format("the body of link {} has no mass", linden::quoted(entry.key)), "one that drag can act on",
+                           "leave it out");
         const auto [before, fresh] = named.emplace(slot, entry.key);
         if (!fresh) {
-          entry.value.fail(fmt::format("links {} and {} are one body", linden::quoted(before->second), linden::quoted(entry.key)), "every body once", "leave one out");
+          entry.value.fail(fmt::format("links {} and {} are one body", linden::quoted(before->second), linden::quoted(entry.key)),
+                           "every body once", "leave one out");
         }
         drags[slot] = coefficients(entry.value, Drag{slot});
       }
@@ -414,7 +438,8 @@ class Reader {
       if (const auto normal = at.find("normal")) {
         const Vector3d direction = vector_of(normal->vector("[x, y, z], which way is up"));
         const double length = direction.stableNorm();
-        if (!(length > 0) || !std::isfinite(length)) normal->fail("effects.ground.normal has no direction", "[x, y, z], which way is up", "write [0, 0, 1]");
+        if (!(length > 0) || !std::isfinite(length))
+          normal->fail("effects.ground.normal has no direction", "[x, y, z], which way is up", "write [0, 0, 1]");
         ground.normal = array_of(direction / length);
       }
       if (const auto value = at.find("height")) ground.height = value->number();
@@ -430,9 +455,12 @@ class Reader {
   HeightField terrain(const SceneValue& at) const {
     at.entries_of(kTerrain);
     const auto file = at.find("file"), spacing = at.find("spacing"), origin = at.find("origin");
-    if (!file || !spacing) at.fail(fmt::format("{} has no {}", at.path(), file ? "spacing" : "file"), "file and spacing", "add it");
+    if (!file || !spacing)
+      at.fail(fmt::format("{} has no {}", at.path(), file ? "spacing" : "file"), "file and spacing", "add it");
     const std::vector<double> apart = spacing->numbers(2, "[dx, dy] in m");
-    if (!(apart[0] > 0) || !(apart[1] > 0)) spacing->fail(fmt::format("{} holds {} and {}", spacing->path(), apart[0], apart[1]), "two numbers above zero", "change them");
+    if (!(apart[0] > 0) || !(apart[1] > 0))
+      spacing->fail(fmt::format("{} holds {} and {}", spacing->path(), apart[0], apart[1]), "two numbers above zero",
+                    "change them");
     const std::vector<double> begin = origin ? origin->numbers(2, "[x, y] in m") : std::vector<double>{0, 0};
     const std::string path = file_of(*file);
     const NumberTable table = file->located([&] { return read_numbers(path, 0, 2); });

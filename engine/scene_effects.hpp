@@ -14,9 +14,9 @@
 //   drag       {linear, quadratic, wind, bodies: {link: {linear, quadratic}}}
 //   ground     {normal, height, stiffness, damping, friction, terrain: {file, spacing, origin}}
 //
-// A servo acts on every screw joint where `stiffness` stands beside `joints` or alone; on those that `joints` names where it is a list, or a
-// map without a `stiffness` beside it. Targets are the positions at the start where none are given.
-// Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo and torque refuse followers.
+// A servo acts on every screw joint; on those that `joints` names where it is a list, or a map without a `stiffness` beside it. Targets
+// are the positions at the start where none are given.
+// Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo and torque refuse it.
 // Free joints have none of these, ball joints damping and spring only. A link that is merged into another's body acts there.
 // CSV files are found relative to the scene: time,value a line for torque and wrench (there a share of force and moment).
 #pragma once

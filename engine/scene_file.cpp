@@ -21,9 +21,10 @@ namespace {
 
 using Kind = SceneValue::Kind;
 
-const std::vector<std::string> kScene{"model",     "models", "base",           "step",       "duration", "solver",  "order", "guess",
-                                      "tolerance", "stop",   "max_iterations", "max_splits", "initial",  "effects"};
-const std::vector<std::string> kModel{"model", "base", "name", "position", "rotation", "quaternion", "velocity", "angular_velocity"};
+const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
+                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "effects"};
+const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
+                                      "rotation", "quaternion", "velocity", "angular_velocity"};
 const std::vector<std::string> kBases{"fixed", "floating"};
 
 /// A model of the list `models`.
@@ -57,7 +58,8 @@ class SceneReader {
   void read_model() {
     const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base");
     if (one && several) several->fail("model and models are both given", "one of them", "move the model into the list models");
-    if (!one && !several) root_.fail("the scene has no model", "model: and a URDF file, or a generated one such as chain:3", "add it");
+    if (!one && !several)
+      root_.fail("the scene has no model", "model: and a URDF file, or a generated one such as chain:3", "add it");
     if (one) {
       scene_.model = load(*one, base);
       return;
@@ -68,7 +70,8 @@ class SceneReader {
 
   Model load(const SceneValue& at, const std::optional<SceneValue>& base) const {
     const std::string& name = at.text("a URDF file, or a generated model such as chain:3");
-    const std::optional<Base> root = base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
+    const std::optional<Base> root =
+        base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
     if (is_generated(name)) {
       if (base) base->fail(fmt::format("base, but {} is generated, base and all", name), "it beside a URDF file", "leave it out");
       return at.located([&] {
@@ -91,7 +94,9 @@ class SceneReader {
     for (const SceneValue& item : at.list("models, {model: FILE.urdf, name: ..., position: [x, y, z]}")) {
       item.entries_of(kModel);
       const auto model = item.find("model");
-      if (!model) item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3", "add it");
+      if (!model)
+        item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3",
+                  "add it");
       entrants.push_back({item, {load(*model, item.find("base")), "", Pose::Identity()}, read_base(item)});
       const auto name = item.find("name");
       if (name) entrants.back().placed.name = name->text("a name");
@@ -115,7 +120,8 @@ class SceneReader {
       std::string& name = entrant.placed.name;
       if (name.empty()) name = entrant.placed.model.names.model;
       if (!seen.insert(name).second) {
-        entrant.at.fail(fmt::format("two models are called {}", linden::quoted(name)), "a name of its own for each", "write name: beside them");
+        entrant.at.fail(fmt::format("two models are called {}", linden::quoted(name)), "a name of its own for each",
+                        "write name: beside them");
       }
     }
   }
@@ -125,12 +131,15 @@ class SceneReader {
     const Model& model = entrant.placed.model;
     const std::size_t free = floating_roots(model).size();
     if (free == 0 && (entrant.base.velocity || entrant.base.angular_velocity)) {
-      entrant.at.fail(fmt::format("{} has a velocity, but its base is fixed", entrant.at.path()), "a floating base", "write base: floating, or leave it out");
+      entrant.at.fail(fmt::format("{} has a velocity, but its base is fixed", entrant.at.path()), "a floating base",
+                      "write base: floating, or leave it out");
     }
     if (free == 0 || free < roots(model)) entrant.placed.pose = entrant.base.pose();
   }
 
-  static std::size_t roots(const Model& model) { return static_cast<std::size_t>(model.tree.level_begin[2] - model.tree.level_begin[1]); }
+  static std::size_t roots(const Model& model) {
+    return static_cast<std::size_t>(model.tree.level_begin[2] - model.tree.level_begin[1]);
+  }
 
   void remember_bases(const Entrant& entrant, const PlacedModel& part) {
     const bool moved = floating_roots(part.model).size() < roots(part.model);
@@ -150,7 +159,8 @@ class SceneReader {
       if (key == "tolerance") options.tolerance = value.positive();
       if (key == "solver") options.solver = solver_from(value.choice(names_of({Solver::newton, Solver::riqn})));
       if (key == "guess") {
-        options.guess = guess_from(value.choice(names_of({FirstGuess::extrapolation, FirstGuess::ig1, FirstGuess::ig2, FirstGuess::ig3})));
+        options.guess =
+            guess_from(value.choice(names_of({FirstGuess::extrapolation, FirstGuess::ig1, FirstGuess::ig2, FirstGuess::ig3})));
       }
       if (key == "stop") options.stop = stop_from(value.choice(names_of({StopTest::energy, StopTest::absolute})));
       if (key == "max_iterations") options.max_iterations = value.integer(0, 1'000'000);
@@ -158,7 +168,8 @@ class SceneReader {
       if (key == "order" && value.number() != 2) value.refuse("2", "only order 2 exists");
     }
     if (scene_.duration < options.step) {
-      root_.fail(fmt::format("a duration of {} s is less than a step of {} s", scene_.duration, options.step), "one step or more", "change one of them");
+      root_.fail(fmt::format("a duration of {} s is less than a step of {} s", scene_.duration, options.step), "one step or more",
+                 "change one of them");
     }
   }
 

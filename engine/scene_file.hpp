@@ -9,16 +9,17 @@
 //     gravity: [0, 0, -9.81]
 //     damping: urdf
 //
-//   model | models   one of them. models: a list of {model, base, name, position, rotation or quaternion, velocity, angular_velocity}; several
-//                    are one system, links and joints of each called name/link and name/joint, name the model's own where not given
+//   model | models   one of them. models: a list of {model, base, name, position, rotation or quaternion, velocity,
+//                    angular_velocity}; several are one system, links and joints of each called name/link and name/joint, where
+//                    the name is the model's own unless it is given
 //   base             fixed (default) or floating, for a URDF file
 //   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; order: 2
 //   initial          engine/scene_start.hpp
 //   effects          engine/scene_effects.hpp; gravity is one of them: without its key there is none
 //
 // A floating model starts at its position and rotation, a fixed one sits there.
-// Whatever is wrong - a key or a name that is not known, a value of the wrong kind or one that makes no sense - throws InputError with
-// file, line and advice.
+// Whatever is wrong - a key or a name that is not known, a value of the wrong kind or one that makes no sense - throws InputError
+// with file, line and advice.
 #pragma once
 
 #include <string>

@@ -24,7 +24,9 @@ Vector3d vector_of(const SceneValue& at, const char* expected) {
 Pose placement_of(const Model& model, Index slot) {
   Pose pose = Pose::Identity();
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
+    for (int column = 0; column < 3; ++column) {
+      pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
+    }
     pose.translation()[row] = model.constants.tree_placement(slot, 9 + row);
   }
   return pose;
@@ -100,7 +102,7 @@ class Start {
   double& v(Index row) { return state_.velocities[static_cast<std::size_t>(row)]; }
 
   void put(bool velocity, Index first, const std::vector<double>& values) {
-    for (std::size_t k = 0; k < values.size(); ++k) (velocity ? v(first + static_cast<Index>(k)) : q(first + static_cast<Index>(k))) = values[k];
+    std::ranges::copy(values, velocity ? &v(first) : &q(first));
   }
 
   Pose pose_of(Index slot) {
@@ -173,7 +175,8 @@ std::vector<Index> floating_roots(const Model& model) {
   return slots;
 }
 
-InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases, const SceneStart& given) {
+InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
+                        const SceneStart& given) {
   constexpr double kMostSeed = 9007199254740992.0;  // whole numbers beyond it have no double of their own
   std::optional<std::uint64_t> seed = given.seed;
   std::optional<double> spread = given.spread;

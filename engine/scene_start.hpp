@@ -1,8 +1,8 @@
 // engine/scene_start.hpp
 // Where a scene's motion begins: its key `initial`, and the poses of floating models.
 //
-//   base       {position, rotation: [roll, pitch, yaw] or quaternion: [x, y, z, w], velocity, angular_velocity} of the one floating base,
-//              all in the world's frame
+//   base       {position, rotation: [roll, pitch, yaw] or quaternion: [x, y, z, w], velocity, angular_velocity} of the one floating
+//              base, all in the world's frame
 //   positions  {joint: number, or of a ball joint quaternion}
 //   velocities {joint: number, or of a ball joint three, in the body's frame}
 //   seed, spread  start from random positions and speeds (engine/initial_state.hpp); what is named above goes over them
@@ -45,6 +45,7 @@ struct PlacedBase {
 std::vector<Index> floating_roots(const Model& model);
 
 /// `at`: the scene's `initial`, where it has one. Throws InputError with file and line.
-InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases, const SceneStart& given);
+InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
+                        const SceneStart& given);
 
 }  // namespace linden

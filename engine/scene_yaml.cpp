@@ -19,7 +19,8 @@ namespace {
 
 using Kind = YamlNode::Kind;
 
-[[noreturn]] void fail_at(const std::string& file, int line, const std::string& found, std::string_view expected, std::string_view advice) {
+[[noreturn]] void fail_at(const std::string& file, int line, const std::string& found, std::string_view expected,
+                          std::string_view advice) {
   throw InputError(fmt::format("{}:{}: {}; expected {}; {}", file, line, found, expected, advice));
 }
 
@@ -31,7 +32,9 @@ class Builder : public YAML::EventHandler {
   const std::shared_ptr<YamlNode>& root() const { return root_; }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (root_) fail_at(file_, line_of(mark), "a second document begins", "one scene a file", "leave out the ---, or make it a file of its own");
+    if (root_)
+      fail_at(file_, line_of(mark), "a second document begins", "one scene a file",
+              "leave out the ---, or make it a file of its own");
   }
   void OnDocumentEnd() override {}
   void OnAnchor(const YAML::Mark&, const std::string&) override {}
@@ -43,7 +46,8 @@ class Builder : public YAML::EventHandler {
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     if (expects_key()) refuse_key(mark);
     const auto found = anchored_.find(anchor);
-    if (found == anchored_.end()) fail_at(file_, line_of(mark), "an alias stands within what it names", "plain values", "write it out");
+    if (found == anchored_.end())
+      fail_at(file_, line_of(mark), "an alias stands within what it names", "plain values", "write it out");
     add(found->second, line_of(mark));
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, const std::string& value) override {
@@ -63,7 +67,8 @@ class Builder : public YAML::EventHandler {
     node->text = value;
     put(node, anchor);
   }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, YAML::EmitterStyle::value) override {
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
     begin(mark, tag, anchor, Kind::list);
   }
   void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, YAML::EmitterStyle::value) override {
@@ -158,7 +163,8 @@ void refuse_control_characters(const std::string& text, const std::string& file)
     if (c == '\n') ++line;
     const auto code = static_cast<unsigned char>(c);
     if (code >= ' ' || c == '\n' || c == '\r' || c == '\t') continue;
-    fail_at(file, line, fmt::format("the control character {:#04x}", code), "plain text in UTF-8", "make sure that this is a scene");
+    fail_at(file, line, fmt::format("the control character {:#04x}", code), "plain text in UTF-8",
+            "make sure that this is a scene");
   }
 }
 
@@ -178,7 +184,8 @@ int line_with_tab(const std::string& text, int last) {
 }
 
 std::string one_line(std::string text) {
-  std::ranges::replace_if(text, [](unsigned char c) { return c < ' '; }, ' ');
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < ' '; }, ' ');
   return text;
 }
 
@@ -215,7 +222,8 @@ SceneYaml::SceneYaml(const std::string& text, std::string file) : file_(std::mov
             "check indentation, colons, quotes and brackets here and above");
   }
   root_ = builder.root();
-  if (!root_ || root_->kind == Kind::nothing) fail_at(file_, 1, "the file is empty", "a scene", "begin with model: and a file or chain:3");
+  if (!root_ || root_->kind == Kind::nothing)
+    fail_at(file_, 1, "the file is empty", "a scene", "begin with model: and a file or chain:3");
 }
 
 void SceneValue::fail(const std::string& found, std::string_view expected, std::string_view advice) const {
@@ -223,7 +231,8 @@ void SceneValue::fail(const std::string& found, std::string_view expected, std::
 }
 
 void SceneValue::refuse(std::string_view expected, std::string_view advice) const {
-  fail(path_.empty() ? "the file holds " + described(*node_) : fmt::format("{} is {}", path_, described(*node_)), expected, advice);
+  fail(path_.empty() ? "the file holds " + described(*node_) : fmt::format("{} is {}", path_, described(*node_)), expected,
+       advice);
 }
 
 std::string SceneValue::place() const { return fmt::format("{}:{}: {}", *file_, line_, path_); }
@@ -252,7 +261,8 @@ double SceneValue::not_negative(std::string_view expected) const {
 
 int SceneValue::integer(int least, int most) const {
   const double value = number();
-  if (value != std::floor(value) || value < least || value > most) refuse(fmt::format("a whole number from {} to {}", least, most), "change it");
+  if (value != std::floor(value) || value < least || value > most)
+    refuse(fmt::format("a whole number from {} to {}", least, most), "change it");
   return static_cast<int>(value);
 }
 
@@ -263,7 +273,8 @@ std::vector<double> SceneValue::numbers() const {
 }
 
 std::vector<double> SceneValue::numbers(std::size_t count, std::string_view expected) const {
-  if (!is(Kind::list) || node_->items.size() != count) refuse(expected, fmt::format("write [{}", count == 2 ? "0, 0]" : count == 3 ? "0, 0, 1]" : "0, 0, 0, 1]"));
+  if (!is(Kind::list) || node_->items.size() != count)
+    refuse(expected, fmt::format("write [{}", count == 2 ? "0, 0]" : count == 3 ? "0, 0, 1]" : "0, 0, 0, 1]"));
   return numbers();
 }
 
@@ -322,7 +333,7 @@ std::vector<SceneValue::Entry> SceneValue::entries_of(std::span<const std::strin
     const std::string guess = nearest(key, known);
     const bool misplaced = std::ranges::find(elsewhere, key) != elsewhere.end();
     value.fail(fmt::format("the key {}{} is not known", quoted(key), path_.empty() ? "" : " of " + path_), expected,
-               misplaced         ? fmt::format("write it below {}", place)
+               misplaced       ? fmt::format("write it below {}", place)
                : guess.empty() ? std::string("leave it out")
                                : fmt::format("did you mean {}?", guess));
   }
@@ -334,7 +345,8 @@ std::optional<SceneValue> SceneValue::find(std::string_view key) const {
   const auto found = std::ranges::find(node_->keys, key);
   if (found == node_->keys.end()) return std::nullopt;
   const auto k = static_cast<std::size_t>(found - node_->keys.begin());
-  return SceneValue(*node_->items[k], path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key), node_->key_lines[k], *file_);
+  return SceneValue(*node_->items[k], path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key), node_->key_lines[k],
+                    *file_);
 }
 
 }  // namespace linden

@@ -8,8 +8,8 @@
 //     more than kMostValues, aliases written out
 //   values have no tags                              !!python/object and the like
 //
-// A SceneValue is a view into a SceneYaml, which must outlive it. Every message is `file:line: what was found; what was expected; what
-// to do`, on one line. Numbers are read as in the "C" locale.
+// A SceneValue is a view into a SceneYaml, which must outlive it. Every message is `file:line: what was found; what was expected;
+// what to do`, on one line. Numbers are read as in the "C" locale.
 #pragma once
 
 #include <array>
@@ -27,8 +27,8 @@ struct YamlNode {
   enum class Kind : std::uint8_t { nothing, text, list, map };
   Kind kind = Kind::nothing;
   int line = 1;
-  std::string text;                                    // of a text
-  std::vector<std::string> keys;                       // of a map
+  std::string text;               // of a text
+  std::vector<std::string> keys;  // of a map
   std::vector<int> key_lines;
   std::vector<std::shared_ptr<const YamlNode>> items;  // of a list or a map
   std::size_t count = 1;                               // of values: this one and all within

@@ -105,15 +105,16 @@ class Checker {
     each("ball_springs", effects_.ball_springs, [&](const BallSpring& entry) {
       require_slot(entry.slot);
       if (model_.tree.kind(entry.slot) != JointKind::ball) {
-        fail(fmt::format("joint \"{}\" is no ball joint", model_.names.joint[static_cast<std::size_t>(entry.slot)]), "a ball joint",
-             "give it a JointSpring");
+        fail(fmt::format("joint \"{}\" is no ball joint", model_.names.joint[static_cast<std::size_t>(entry.slot)]),
+             "a ball joint", "give it a JointSpring");
       }
       not_negative("stiffness", entry.stiffness);
       unit("rest", entry.rest);
     });
     each("damping", effects_.damping, [&](const JointDamping& entry) {
       require_row(entry.row);
-      if (facts_.kind(entry.row) == JointKind::free) fail(row_text(model_, entry.row) + " is of a free joint", "a screw or ball joint", "use drag");
+      if (facts_.kind(entry.row) == JointKind::free)
+        fail(row_text(model_, entry.row) + " is of a free joint", "a screw or ball joint", "use drag");
       not_negative("coefficient", entry.coefficient);
     });
     once("friction", effects_.friction, [&](const JointFriction& entry) {
@@ -148,7 +149,8 @@ class Checker {
         finite("force", entry.force[at]);
         finite("moment", entry.moment[at]);
       }
-      if (!(entry.from <= entry.to)) fail(fmt::format("it goes from {} to {} s", entry.from, entry.to), "from at or before to", "exchange them");
+      if (!(entry.from <= entry.to))
+        fail(fmt::format("it goes from {} to {} s", entry.from, entry.to), "from at or before to", "exchange them");
       require_course("scale", entry.scale);
     });
     each("drag", effects_.drag, [&](const Drag& entry) {
@@ -184,7 +186,8 @@ class Checker {
     std::unordered_set<Index> seen;
     each(list_name, list, [&](const Entry& entry) {
       look(entry);
-      if (!seen.insert(entry.row).second) fail(row_text(model_, entry.row) + " is named twice", "one entry a joint", "leave one out");
+      if (!seen.insert(entry.row).second)
+        fail(row_text(model_, entry.row) + " is named twice", "one entry a joint", "leave one out");
     });
   }
 
@@ -236,8 +239,8 @@ class Checker {
 
   void require_course(const char* what, const Course& course) const {
     if (course.times.empty() || course.times.size() != course.values.size()) {
-      fail(fmt::format("{} has {} times and {} values", what, course.times.size(), course.values.size()), "one value a time, one or more",
-           "add what is missing");
+      fail(fmt::format("{} has {} times and {} values", what, course.times.size(), course.values.size()),
+           "one value a time, one or more", "add what is missing");
     }
     for (const double value : course.values) finite(what, value);
     for (std::size_t k = 0; k < course.times.size(); ++k) {
@@ -255,8 +258,11 @@ class Checker {
     not_negative("damping", ground.damping);
     not_negative("friction", ground.friction);
     if (ground.terrain) check_terrain(*ground.terrain);
-    const auto sorted = [](const auto& list) { return std::ranges::is_sorted(list, {}, [](const auto& entry) { return entry.slot; }); };
-    if (!sorted(ground.contacts.spheres) || !sorted(ground.contacts.rims)) fail("its contacts are in no order", "bodies in ascending order", "sort them by slot");
+    const auto sorted = [](const auto& list) {
+      return std::ranges::is_sorted(list, {}, [](const auto& entry) { return entry.slot; });
+    };
+    if (!sorted(ground.contacts.spheres) || !sorted(ground.contacts.rims))
+      fail("its contacts are in no order", "bodies in ascending order", "sort them by slot");
     for (const ContactSphere& sphere : ground.contacts.spheres) {
       require_slot(sphere.slot);
       for (const double value : sphere.center) finite("the centre of a contact", value);
@@ -277,7 +283,8 @@ class Checker {
     }
     const auto expected = static_cast<std::size_t>(terrain.columns) * static_cast<std::size_t>(terrain.rows);
     if (terrain.heights.size() != expected) {
-      fail(fmt::format("it has {} heights", terrain.heights.size()), fmt::format("columns x rows = {}", expected), "make them agree");
+      fail(fmt::format("it has {} heights", terrain.heights.size()), fmt::format("columns x rows = {}", expected),
+           "make them agree");
     }
     positive("spacing_x", terrain.spacing_x);
     positive("spacing_y", terrain.spacing_y);
@@ -334,7 +341,10 @@ const LinkPlace& place_of(const Model& model, const std::string& link) {
 
 std::vector<Armature> on_leaders(const Model& model, const std::vector<Armature>& list) {
   return carried(
-      model, list, [](Armature entry, const Mimic& mimic) { return Armature{entry.row, entry.inertia * mimic.multiplier * mimic.multiplier}; },
+      model, list,
+      [](Armature entry, const Mimic& mimic) {
+        return Armature{entry.row, entry.inertia * mimic.multiplier * mimic.multiplier};
+      },
       [](Armature& into, const Armature& other) { into.inertia += other.inertia; });
 }
 
@@ -349,7 +359,10 @@ std::vector<JointDamping> on_leaders(const Model& model, const std::vector<Joint
 
 std::vector<JointFriction> on_leaders(const Model& model, const std::vector<JointFriction>& list) {
   return carried(
-      model, list, [](JointFriction entry, const Mimic& mimic) { return JointFriction{entry.row, entry.force * std::abs(mimic.multiplier)}; },
+      model, list,
+      [](JointFriction entry, const Mimic& mimic) {
+        return JointFriction{entry.row, entry.force * std::abs(mimic.multiplier)};
+      },
       [](JointFriction& into, const JointFriction& other) { into.force += other.force; });
 }
 
@@ -369,9 +382,10 @@ std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLi
       });
   for (const JointLimit& limit : result) {
     if (limit.lower > limit.upper) {
-      throw InputError(fmt::format("joint \"{}\": its limits and those of the joints that follow it leave no room, {} to {}; expected "
-                                   "limits that overlap; widen them",
-                                   model.names.velocity[static_cast<std::size_t>(limit.row)], limit.lower, limit.upper));
+      throw InputError(
+          fmt::format("joint \"{}\": its limits and those of the joints that follow it leave no room, {} to {}; expected "
+                      "limits that overlap; widen them",
+                      model.names.velocity[static_cast<std::size_t>(limit.row)], limit.lower, limit.upper));
     }
   }
   return result;
@@ -408,18 +422,22 @@ std::vector<JointLimit> urdf_limits(const Model& model, double restitution) {
   return on_leaders(model, list);
 }
 
-std::vector<Armature> armature_everywhere(const Model& model, double inertia) { return everywhere<Armature>(model, inertia, false); }
+std::vector<Armature> armature_everywhere(const Model& model, double inertia) {
+  return everywhere<Armature>(model, inertia, false);
+}
 
 std::vector<JointDamping> damping_everywhere(const Model& model, double coefficient) {
   return everywhere<JointDamping>(model, coefficient, true);
 }
 
-std::vector<JointFriction> friction_everywhere(const Model& model, double force) { return everywhere<JointFriction>(model, force, false); }
+std::vector<JointFriction> friction_everywhere(const Model& model, double force) {
+  return everywhere<JointFriction>(model, force, false);
+}
 
 std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping, const std::vector<double>& positions) {
   if (!positions.empty() && positions.size() != static_cast<std::size_t>(model.tree.shape.positions)) {
-    throw InputError(fmt::format("{} positions given as targets; expected {}; give one a coordinate of model \"{}\"", positions.size(),
-                                 model.tree.shape.positions, model.names.model));
+    throw InputError(fmt::format("{} positions given as targets; expected {}; give one a coordinate of model \"{}\"",
+                                 positions.size(), model.tree.shape.positions, model.names.model));
   }
   const RowFacts facts(model);
   std::vector<Servo> list;

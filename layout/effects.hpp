@@ -24,8 +24,8 @@ namespace linden {
 
 struct Model;
 
-/// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend; where two
-/// are equal the number jumps.
+/// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend; where
+/// two are equal the number jumps.
 struct Course {
   std::vector<double> times{0};
   std::vector<double> values{0};
@@ -151,21 +151,22 @@ std::vector<Armature> armature_everywhere(const Model& model, double inertia);
 std::vector<JointDamping> damping_everywhere(const Model& model, double coefficient);
 std::vector<JointFriction> friction_everywhere(const Model& model, double force);
 
-/// On every screw joint that follows no other, no stronger than the file's effort limits, with `positions` [nq] for targets; empty: the
-/// zero configuration.
-std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping, const std::vector<double>& positions = {});
+/// On every screw joint that follows no other, no stronger than the file's effort limits, with `positions` [nq] for targets; empty:
+/// the zero configuration.
+std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping,
+                                    const std::vector<double>& positions = {});
 
-/// Carries what stands on followers' rows to their leaders' (q_f = m q + o): inertia and damping times m^2, friction times |m|, limits
-/// through the map, the tighter ones and the smaller restitution where several meet. One entry a row is left, sorted by row. Throws
-/// InputError where limits leave no room.
+/// Carries what stands on followers' rows to their leaders' (q_f = m q + o): inertia and damping times m^2, friction times |m|,
+/// limits through the map, the tighter ones and the smaller restitution where several meet. One entry a row is left, sorted by row.
+/// Throws InputError where limits leave no room.
 std::vector<Armature> on_leaders(const Model& model, const std::vector<Armature>& list);
 std::vector<JointDamping> on_leaders(const Model& model, const std::vector<JointDamping>& list);
 std::vector<JointFriction> on_leaders(const Model& model, const std::vector<JointFriction>& list);
 std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLimit>& list);
 
-/// Throws InputError where an effect names what is not there or cannot have it (a row out of range, a screw's effect on a ball or free
-/// joint or on a mimic joint's follower), holds a number that makes no sense, or meets another of its kind where there can be only one:
-/// friction, limits and servos.
+/// Throws InputError where an effect names what is not there or cannot have it (a row out of range, a screw's effect on a ball or
+/// free joint or on a mimic joint's follower), holds a number that makes no sense, or meets another of its kind where there can be
+/// only one: friction, limits and servos.
 void check(const Effects& effects, const Model& model);
 
 }  // namespace linden

@@ -50,7 +50,8 @@ class Merger {
         for (Index i = run.begin; i < run.end; ++i) order_.push_back({part, i, tree.level(i), run.kind});
       }
     }
-    std::ranges::stable_sort(order_, [](const Origin& a, const Origin& b) { return std::tie(a.level, a.kind) < std::tie(b.level, b.kind); });
+    std::ranges::stable_sort(
+        order_, [](const Origin& a, const Origin& b) { return std::tie(a.level, a.kind) < std::tie(b.level, b.kind); });
     for (std::size_t k = 0; k < order_.size(); ++k) {
       new_slot_[order_[k].part][static_cast<std::size_t>(order_[k].slot)] = static_cast<Index>(k) + 1;
     }
@@ -147,7 +148,8 @@ class Merger {
   }
 
   [[noreturn]] static void fail(const char* what, const std::string& name) {
-    throw InputError(fmt::format("two {} are called \"{}\"; names must be unique; give each model a name of its own", what, name));
+    throw InputError(
+        fmt::format("two {} are called \"{}\"; names must be unique; give each model a name of its own", what, name));
   }
 
   const std::vector<PlacedModel>& parts_;

@@ -16,8 +16,8 @@ namespace linden {
 
 struct PlacedModel {
   Model model;
-  std::string name;               // before the names of its links and joints; empty: they stay as they are
-  Pose pose = Pose::Identity();   // of what the model takes for the world
+  std::string name;              // before the names of its links and joints; empty: they stay as they are
+  Pose pose = Pose::Identity();  // of what the model takes for the world
 };
 
 /// Throws InputError where there is no model, a pose is not finite, or two links, joints or coordinates end up with one name.

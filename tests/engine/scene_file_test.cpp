@@ -79,8 +79,9 @@ TEST_CASE("a scene of a model alone is the model at rest without gravity", "[sce
 }
 
 TEST_CASE("every option of a scene reaches its value", "[scene]") {
-  const Scene s = scene("model: chain:3\nstep: 2e-3\nduration: 4.5\nsolver: riqn\norder: 2\nguess: ig2\ntolerance: 1e-8\nstop: absolute\n"
-                        "max_iterations: 77\nmax_splits: 3\neffects: {gravity: [1, -2, 3.5]}\n");
+  const Scene s = scene(
+      "model: chain:3\nstep: 2e-3\nduration: 4.5\nsolver: riqn\norder: 2\nguess: ig2\ntolerance: 1e-8\nstop: absolute\n"
+      "max_iterations: 77\nmax_splits: 3\neffects: {gravity: [1, -2, 3.5]}\n");
   CHECK(s.options.step == 2e-3);
   CHECK(s.duration == 4.5);
   CHECK(s.options.solver == Solver::riqn);
@@ -103,15 +104,18 @@ TEST_CASE("models are found beside the scene, and float where it says so", "[sce
 }
 
 TEST_CASE("the start of a scene is where it says", "[scene]") {
-  const Scene s = scene(kHumanoid + "initial:\n"
-                                    "  base: {position: [1, 2, 3], rotation: [0.1, 0.2, 0.3], velocity: [0, 0, 5], angular_velocity: [1, 0, 0]}\n"
-                                    "  positions: {left_knee_pitch: 0.4}\n"
-                                    "  velocities: {neck_yaw: -2}\n");
+  const Scene s =
+      scene(kHumanoid +
+            "initial:\n"
+            "  base: {position: [1, 2, 3], rotation: [0.1, 0.2, 0.3], velocity: [0, 0, 5], angular_velocity: [1, 0, 0]}\n"
+            "  positions: {left_knee_pitch: 0.4}\n"
+            "  velocities: {neck_yaw: -2}\n");
   CHECK(position(s, "base.x") == 1);
   CHECK(position(s, "base.y") == 2);
   CHECK(position(s, "base.z") == 3);
   const Eigen::Quaterniond turn(position(s, "base.qw"), position(s, "base.qx"), position(s, "base.qy"), position(s, "base.qz"));
-  const Eigen::Quaterniond expected = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
+  const Eigen::Quaterniond expected = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()) *
+                                      Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
                                       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX());
   CHECK(turn.angularDistance(expected) < 1e-14);
   const Eigen::Vector3d v(velocity(s, "base.vx"), velocity(s, "base.vy"), velocity(s, "base.vz"));
@@ -212,8 +216,9 @@ TEST_CASE("limits come from the file, bounce, or are given by name", "[scene]") 
       CHECK(entry.restitution == (std::string(text).ends_with("urdf\n") ? 0 : 0.4));
     }
   }
-  const Effects named =
-      effects(kArm, "  limits:\n    restitution: 0.2\n    joint_2: {lower: -0.5, upper: 0.25}\n    joint_3: urdf\n    joint_4: {upper: 1, restitution: 1}\n");
+  const Effects named = effects(kArm,
+                                "  limits:\n    restitution: 0.2\n    joint_2: {lower: -0.5, upper: 0.25}\n    joint_3: urdf\n   "
+                                " joint_4: {upper: 1, restitution: 1}\n");
   REQUIRE(named.limits.size() == 3);
   CHECK(named.limits[0].lower == -0.5);
   CHECK(named.limits[0].upper == 0.25);
@@ -237,7 +242,9 @@ TEST_CASE("servos hold the start, as strong as the motors are", "[scene]") {
     CHECK(servo.max_force == arm.attributes.max_effort(servo.row));
     CHECK(servo.target == (servo.row == 1 ? 0.7 : servo.row == 4 ? 0.1 : 0));
   }
-  const Effects own = effects(kArm, "  servo: {stiffness: 200, max_force: 9, joints: {joint_3: {stiffness: 5, damping: 1, target: 2, max_force: none}}}\n");
+  const Effects own = effects(
+      kArm,
+      "  servo: {stiffness: 200, max_force: 9, joints: {joint_3: {stiffness: 5, damping: 1, target: 2, max_force: none}}}\n");
   REQUIRE(own.servos.size() == 7);
   CHECK(own.servos[0].max_force == 9);
   CHECK(own.servos[2].stiffness == 5);
@@ -264,7 +271,8 @@ TEST_CASE("servos hold the start, as strong as the motors are", "[scene]") {
 TEST_CASE("torques are numbers, tables or files", "[scene]") {
   const Folder folder;
   folder.write("push.csv", "time,torque\n# comment\n0, 0\n\n1.5,2\r\n2,-1e-1\n");
-  folder.write("s.yaml", "model: chain:3\neffects:\n  torque: {joint1: 4, joint2: push.csv, joint3: {times: [0, 1], values: [5, 6]}}\n");
+  folder.write("s.yaml",
+               "model: chain:3\neffects:\n  torque: {joint1: 4, joint2: push.csv, joint3: {times: [0, 1], values: [5, 6]}}\n");
   const std::vector<JointTorque> torques = load_scene(folder.file("s.yaml")).effects.torques;
   REQUIRE(torques.size() == 3);
   CHECK(torques[0].force.at(7) == 4);
@@ -276,18 +284,21 @@ TEST_CASE("torques are numbers, tables or files", "[scene]") {
 TEST_CASE("a wrench acts where its link is, behind fixed joints too", "[scene]") {
   const Folder folder;
   folder.write("gust.csv", "0,1\n1,3\n");
-  folder.write("s.yaml", "model: " LINDEN_MODELS_DIR "/arm.urdf\n"
-                         "effects:\n"
-                         "  wrench:\n"
-                         "    tool_flange: {force: [1, 2, 3], moment: [4, 5, 6], point: [0.1, 0.2, 0.3], frame: body, from: 1, to: 1.5}\n"
-                         "    link_3:\n"
-                         "      - {force: [7, 8, 9]}\n"
-                         "      - {moment: [1, 0, 0], frame: world, file: gust.csv}\n");
+  folder.write("s.yaml",
+               "model: " LINDEN_MODELS_DIR
+               "/arm.urdf\n"
+               "effects:\n"
+               "  wrench:\n"
+               "    tool_flange: {force: [1, 2, 3], moment: [4, 5, 6], point: [0.1, 0.2, 0.3], frame: body, from: 1, to: 1.5}\n"
+               "    link_3:\n"
+               "      - {force: [7, 8, 9]}\n"
+               "      - {moment: [1, 0, 0], frame: world, file: gust.csv}\n");
   const Scene s = load_scene(folder.file("s.yaml"));
   const std::vector<BodyWrench>& wrenches = s.effects.wrenches;
   REQUIRE(wrenches.size() == 3);
   const LinkPlace flange = s.model.names.link.at("tool_flange");
-  const Eigen::Vector3d point = flange.in_body * Eigen::Vector3d(0.1, 0.2, 0.3), force = flange.in_body.linear() * Eigen::Vector3d(1, 2, 3),
+  const Eigen::Vector3d point = flange.in_body * Eigen::Vector3d(0.1, 0.2, 0.3),
+                        force = flange.in_body.linear() * Eigen::Vector3d(1, 2, 3),
                         moment = flange.in_body.linear() * Eigen::Vector3d(4, 5, 6);
   CHECK(wrenches[0].slot == flange.slot);
   CHECK_FALSE(wrenches[0].in_world);
@@ -309,7 +320,8 @@ TEST_CASE("a wrench acts where its link is, behind fixed joints too", "[scene]")
 }
 
 TEST_CASE("drag acts on all bodies or on some", "[scene]") {
-  const Effects all = effects(kArm, "  drag: {linear: 0.1, quadratic: 0.2, wind: [2, 0, 1], bodies: {tool_flange: {linear: 5}}}\n");
+  const Effects all =
+      effects(kArm, "  drag: {linear: 0.1, quadratic: 0.2, wind: [2, 0, 1], bodies: {tool_flange: {linear: 5}}}\n");
   REQUIRE(all.drag.size() == 7);
   CHECK(all.drag[0].linear == 0.1);
   CHECK(all.drag[0].quadratic == 0.2);
@@ -325,8 +337,10 @@ TEST_CASE("drag acts on all bodies or on some", "[scene]") {
 TEST_CASE("the ground is a plane, tilted or with heights", "[scene]") {
   const Folder folder;
   folder.write("heights.csv", "0,1,2\n3,4,5\n");
-  folder.write("s.yaml", "model: chain:2\neffects:\n  ground:\n    normal: [0, 3, 4]\n    height: 0.5\n    stiffness: 2e5\n    damping: 10\n"
-                         "    friction: 0.6\n    terrain: {file: heights.csv, spacing: [0.1, 0.2], origin: [-1, -2]}\n");
+  folder.write(
+      "s.yaml",
+      "model: chain:2\neffects:\n  ground:\n    normal: [0, 3, 4]\n    height: 0.5\n    stiffness: 2e5\n    damping: 10\n"
+      "    friction: 0.6\n    terrain: {file: heights.csv, spacing: [0.1, 0.2], origin: [-1, -2]}\n");
   const Effects e = load_scene(folder.file("s.yaml")).effects;
   REQUIRE(e.ground);
   CHECK(e.ground->normal == std::array<double, 3>{0, 0.6, 0.8});
@@ -349,12 +363,15 @@ TEST_CASE("the ground is a plane, tilted or with heights", "[scene]") {
 }
 
 TEST_CASE("several models are one system, placed and named", "[scene]") {
-  const std::string text = "models:\n"
-                           "  - {model: " LINDEN_MODELS_DIR "/arm.urdf, name: left, position: [0, 1, 0]}\n"
-                           "  - {model: " LINDEN_MODELS_DIR "/humanoid.urdf, base: floating, position: [2, 0, 1], rotation: [0, 0, 0.5], velocity: [1, 0, 0]}\n"
-                           "  - {model: chain:3, quaternion: [0, 0, 1, 0]}\n"
-                           "initial: {positions: {left/joint_2: 0.5, 'chain:3/joint1': 0.25}}\n"
-                           "effects: {damping: {humanoid/neck_yaw: 2}}\n";
+  const std::string text =
+      "models:\n"
+      "  - {model: " LINDEN_MODELS_DIR
+      "/arm.urdf, name: left, position: [0, 1, 0]}\n"
+      "  - {model: " LINDEN_MODELS_DIR
+      "/humanoid.urdf, base: floating, position: [2, 0, 1], rotation: [0, 0, 0.5], velocity: [1, 0, 0]}\n"
+      "  - {model: chain:3, quaternion: [0, 0, 1, 0]}\n"
+      "initial: {positions: {left/joint_2: 0.5, 'chain:3/joint1': 0.25}}\n"
+      "effects: {damping: {humanoid/neck_yaw: 2}}\n";
   const Scene s = scene(text);
   CHECK(s.model.names.model == "s");
   CHECK(s.model.tree.bodies() == 7 + 35 + 3);
@@ -372,10 +389,14 @@ TEST_CASE("several models are one system, placed and named", "[scene]") {
 TEST_CASE("models in one scene move as each alone", "[scene]") {
   const std::string rest = "effects: {gravity: [0, 0, -9.81]}\n";
   const std::string arm = std::string(LINDEN_MODELS_DIR) + "/arm.urdf", hand = std::string(LINDEN_MODELS_DIR) + "/hand.urdf";
-  const Scene both = scene("models:\n  - {model: " + arm + ", name: a}\n  - {model: " + hand + ", name: h, base: floating}\n  - {model: 'chain:12', name: c}\n" +
-                           "initial: {positions: {a/joint_2: 0.8, a/joint_4: -1, c/joint3: 0.5}, velocities: {a/joint_1: 2}}\n" + rest);
-  const Scene alone[] = {scene("model: " + arm + "\ninitial: {positions: {joint_2: 0.8, joint_4: -1}, velocities: {joint_1: 2}}\n" + rest),
-                         scene("model: " + hand + "\nbase: floating\n" + rest), scene("model: chain:12\ninitial: {positions: {joint3: 0.5}}\n" + rest)};
+  const Scene both =
+      scene("models:\n  - {model: " + arm + ", name: a}\n  - {model: " + hand +
+            ", name: h, base: floating}\n  - {model: 'chain:12', name: c}\n" +
+            "initial: {positions: {a/joint_2: 0.8, a/joint_4: -1, c/joint3: 0.5}, velocities: {a/joint_1: 2}}\n" + rest);
+  const Scene alone[] = {
+      scene("model: " + arm + "\ninitial: {positions: {joint_2: 0.8, joint_4: -1}, velocities: {joint_1: 2}}\n" + rest),
+      scene("model: " + hand + "\nbase: floating\n" + rest),
+      scene("model: chain:12\ninitial: {positions: {joint3: 0.5}}\n" + rest)};
   Simulation whole(both);
   std::vector<Simulation> parts;
   for (const Scene& s : alone) parts.emplace_back(s);
@@ -403,7 +424,9 @@ TEST_CASE("models in one scene move as each alone", "[scene]") {
 
 TEST_CASE("a placed model moves as the world turned about it would have it", "[scene]") {
   // turned a half about x, gravity points the other way
-  const Scene turned = scene("models:\n  - {model: 'chain:5', rotation: [3.141592653589793, 0, 0], position: [4, 5, 6]}\neffects: {gravity: [0, 0, 9.81]}\n");
+  const Scene turned = scene(
+      "models:\n  - {model: 'chain:5', rotation: [3.141592653589793, 0, 0], position: [4, 5, 6]}\neffects: {gravity: [0, 0, "
+      "9.81]}\n");
   const Scene plain = scene("model: chain:5\neffects: {gravity: [0, 0, -9.81]}\n");
   Simulation a(turned), b(plain);
   run(a, 100);
@@ -427,7 +450,8 @@ TEST_CASE("unknown keys are refused with the nearest one", "[scene]") {
   check_message("model: chain:3\ngravity: [0, 0, 1]\n", 2, {"the key \"gravity\"", "write it below effects"});
   check_message("model: chain:3\nxyzzy: 1\n", 2, {"the key \"xyzzy\"", "expected model, models", "leave it out"});
   check_message("model: chain:3\neffects:\n  gravty: [0, 0, 1]\n", 3, {"the key \"gravty\" of effects", "did you mean gravity?"});
-  check_message("model: chain:3\neffects:\n\n  spring:\n    joint1:\n      stifness: 4\n", 6, {"effects.spring.joint1", "did you mean stiffness?"});
+  check_message("model: chain:3\neffects:\n\n  spring:\n    joint1:\n      stifness: 4\n", 6,
+                {"effects.spring.joint1", "did you mean stiffness?"});
   check_message(kArm + "effects:\n  servo: {stiffness: 1, target: {}}\n", 3, {"did you mean targets?"});
   check_message(kArm + "effects:\n  servo: {joints: {joint_1: {stifness: 1}}}\n", 3, {"did you mean stiffness?"});
   check_message(kArm + "effects:\n  limits: {joint_1: {min: 1}}\n", 3, {"the key \"min\""});
@@ -442,33 +466,36 @@ TEST_CASE("unknown keys are refused with the nearest one", "[scene]") {
 }
 
 TEST_CASE("unknown joints and links are refused with the nearest one", "[scene]") {
-  for (const char* effect : {"armature: {joint_22: 1}", "damping: {joint_22: 1}", "friction: {joint_22: 1}", "spring: {joint_22: {stiffness: 1}}",
-                             "limits: {joint_22: urdf}", "servo: {stiffness: 1, joints: [joint_22]}", "servo: {stiffness: 1, targets: {joint_22: 1}}",
-                             "servo: {joints: {joint_22: {stiffness: 1}}}", "torque: {joint_22: 1}"}) {
-    check_message(kArm + "effects:\n  gravity: [0, 0, 1]\n  " + effect + "\n", 4, {"no joint \"joint_22\" moves", "did you mean \"joint_2\"?"});
+  for (const char* effect :
+       {"armature: {joint_22: 1}", "damping: {joint_22: 1}", "friction: {joint_22: 1}", "spring: {joint_22: {stiffness: 1}}",
+        "limits: {joint_22: urdf}", "servo: {stiffness: 1, joints: [joint_22]}", "servo: {stiffness: 1, targets: {joint_22: 1}}",
+        "servo: {joints: {joint_22: {stiffness: 1}}}", "torque: {joint_22: 1}"}) {
+    check_message(kArm + "effects:\n  gravity: [0, 0, 1]\n  " + effect + "\n", 4,
+                  {"no joint \"joint_22\" moves", "did you mean \"joint_2\"?"});
   }
   for (const char* effect : {"wrench: {link_33: {force: [0, 0, 1]}}", "drag: {bodies: {link_33: {linear: 1}}}"}) {
     check_message(kArm + "effects:\n  " + effect + "\n", 3, {"no link \"link_33\"", "did you mean \"link_3\"?"});
   }
-  check_message(kArm + "initial:\n  positions:\n    joint_22: 1\n", 4, {"no joint \"joint_22\" moves", "did you mean \"joint_2\"?"});
+  check_message(kArm + "initial:\n  positions:\n    joint_22: 1\n", 4,
+                {"no joint \"joint_22\" moves", "did you mean \"joint_2\"?"});
   check_message(kArm + "effects: {wrench: {base_link: {force: [0, 0, 1]}}}\n", 2, {"\"base_link\" is fixed to the world"});
   check_message(kArm + "effects: {torque: {tool_flange_fixed: 1}}\n", 2, {"no joint \"tool_flange_fixed\" moves"});
 }
 
 TEST_CASE("joints that cannot have an effect are refused by name", "[scene]") {
-  for (const char* effect : {"armature: {base: 1}", "damping: {base: 1}", "friction: {base: 1}", "spring: {base: {stiffness: 1}}", "limits: {base: urdf}",
-                             "servo: {stiffness: 1, joints: [base]}", "torque: {base: 1}"}) {
+  for (const char* effect : {"armature: {base: 1}", "damping: {base: 1}", "friction: {base: 1}", "spring: {base: {stiffness: 1}}",
+                             "limits: {base: urdf}", "servo: {stiffness: 1, joints: [base]}", "torque: {base: 1}"}) {
     check_message(kHumanoid + "effects:\n  " + effect + "\n", 4, {"\"base\" is a free joint"});
   }
-  for (const char* effect : {"armature: {joint2: 1}", "friction: {joint2: 1}", "limits: {joint2: {lower: 1}}", "servo: {stiffness: 1, joints: [joint2]}",
-                             "torque: {joint2: 1}"}) {
+  for (const char* effect : {"armature: {joint2: 1}", "friction: {joint2: 1}", "limits: {joint2: {lower: 1}}",
+                             "servo: {stiffness: 1, joints: [joint2]}", "torque: {joint2: 1}"}) {
     check_message(std::string("model: ball-chain:2\neffects:\n  ") + effect + "\n", 3, {"\"joint2\" is a ball joint"});
   }
   const Model hand = load_urdf(LINDEN_MODELS_DIR "/hand.urdf");
   const std::string leader = hand.names.joint[static_cast<std::size_t>(hand.mimics.front().leader_slot)];
   const std::string follower = hand.names.joint[static_cast<std::size_t>(hand.mimics.front().follower_slot)];
-  for (const std::string effect : {"spring: {JOINT: {stiffness: 1}}", "servo: {stiffness: 1, joints: [JOINT]}", "torque: {JOINT: 1}",
-                                   "servo: {stiffness: 1, targets: {JOINT: 1}}"}) {
+  for (const std::string effect : {"spring: {JOINT: {stiffness: 1}}", "servo: {stiffness: 1, joints: [JOINT]}",
+                                   "torque: {JOINT: 1}", "servo: {stiffness: 1, targets: {JOINT: 1}}"}) {
     std::string text = effect;
     text.replace(text.find("JOINT"), 5, follower);
     check_message(kHand + "effects:\n  " + text + "\n", 3, {fmt::format("\"{}\" follows another", follower), leader});
@@ -476,7 +503,9 @@ TEST_CASE("joints that cannot have an effect are refused by name", "[scene]") {
 }
 
 TEST_CASE("values that make no sense are refused where they stand", "[scene]") {
-  const auto refused = [](const std::string& text, const std::vector<std::string>& expected) { check_message("model: chain:3\n" + text, 2, expected); };
+  const auto refused = [](const std::string& text, const std::vector<std::string>& expected) {
+    check_message("model: chain:3\n" + text, 2, expected);
+  };
   refused("step: 0\n", {"step is \"0\"", "above zero"});
   refused("step: -1e-3\n", {"above zero"});
   refused("step: nan\n", {"step is \"nan\"", "a finite number"});
@@ -557,7 +586,8 @@ TEST_CASE("models of a scene that cannot be are refused where they stand", "[sce
   check_message("models:\n- {model: chain:3, velocity: [0, 0, 1]}\n", 2, {"has a velocity, but its base is fixed"});
   check_message("models:\n- {model: chain:3, rotation: [0, 0, 1], quaternion: [0, 0, 0, 1]}\n", 2, {"both given"});
   check_message("base: fixed\nmodels:\n- {model: chain:3}\n", 1, {"base stands beside models"});
-  check_message("model: humanoids:2\ninitial: {base: {position: [0, 0, 1]}}\n", 2, {"2 floating bases", "beside each model in models"});
+  check_message("model: humanoids:2\ninitial: {base: {position: [0, 0, 1]}}\n", 2,
+                {"2 floating bases", "beside each model in models"});
   // a mistake in a model's own file is said with its own place
   const Folder folder;
   folder.write("bad.urdf", "<robot name=\"r\">\n<link/>\n</robot>\n");
@@ -676,13 +706,36 @@ TEST_CASE("the scenes of the project can be run", "[scene]") {
   CHECK(position(drop, "base.z") - (0.927 - 0.859 * (1 - std::cos(0.2))) == Approx(0.3).margin(2e-3));
 }
 
+TEST_CASE("the scenes of the readme are scenes", "[scene]") {
+  const Folder folder;
+  for (const char* file : {"arm.urdf", "humanoid.urdf"})
+    std::filesystem::copy_file(LINDEN_MODELS_DIR + std::string("/") + file, folder / file);
+  folder.write("push.csv", "0,0\n1,2\n");
+  const std::string readme = text_of(LINDEN_MODELS_DIR "/../README.md"), fence = "```yaml\n";
+  int scenes = 0;
+  for (std::size_t at = readme.find(fence); at != readme.npos; at = readme.find(fence, at)) {
+    at += fence.size();
+    const std::string text = readme.substr(at, readme.find("```", at) - at);
+    CHECK(parse_scene(text, folder.file("s.yaml")).model.warnings.empty());
+    ++scenes;
+  }
+  CHECK(scenes == 2);
+  CHECK_THAT(readme, Contains("no joint\n\"left_kne_pitch\" moves in model \"humanoid\"; expected one that does; did you mean"));
+  check_message(
+      kHumanoid + "effects: {damping: {left_kne_pitch: 1}}\n", 3,
+      {"effects.damping.left_kne_pitch: no joint \"left_kne_pitch\" moves in model \"humanoid\"; expected one that does; did you "
+       "mean \"left_knee_pitch\"?"});
+}
+
 TEST_CASE("mangled scenes are read or refused, and nothing else", "[scene]") {
-  const std::string seeds[] = {text_of(kScenes + "humanoid_drop.yaml"), text_of(kScenes + "two_models.yaml"), text_of(kScenes + "arm_servo.yaml"),
+  const std::string seeds[] = {text_of(kScenes + "humanoid_drop.yaml"), text_of(kScenes + "two_models.yaml"),
+                               text_of(kScenes + "arm_servo.yaml"),
                                "model: ball-chain:2\ninitial: {positions: {joint1: [0, 0, 0, 1]}, seed: 3}\neffects:\n"
                                "  spring: &s {joint1: {stiffness: 5, rest: [0, 0, 0, 1]}}\n  torque: {}\n"
                                "  wrench: {link1: [{force: [1, 2, 3], from: 0, to: 1}]}\n  drag: {linear: 1, wind: [1, 2, 3]}\n"
                                "  ground: {normal: [0, 0, 1], height: 0, friction: 0.5}\n"};
-  const std::string pieces[] = {":", "-", "{", "}", "[", "]", "\n", "\t", " ", "&a", "*a", "!!", "|", ">", "?", "#", "'", "\"", "nan", "~", "---", ",", "%", "\xff", "<<: "};
+  const std::string pieces[] = {":", "-", "{", "}", "[",  "]",   "\n", "\t",  " ", "&a", "*a",   "!!",  "|",
+                                ">", "?", "#", "'", "\"", "nan", "~",  "---", ",", "%",  "\xff", "<<: "};
   Random random(11);
   int read = 0, refused = 0;
   for (int round = 0; round < 4000; ++round) {
@@ -716,7 +769,9 @@ TEST_CASE("mangled scenes are read or refused, and nothing else", "[scene]") {
 
 TEST_CASE("the program runs and inspects scenes", "[scene][command line]") {
   const Shell shell;
-  shell.write("a.yaml", "model: " LINDEN_MODELS_DIR "/arm.urdf\nduration: 0.02\nstep: 2e-3\neffects:\n  gravity: [0, 0, -9.81]\n  damping: urdf\n  limits: urdf\n");
+  shell.write("a.yaml",
+              "model: " LINDEN_MODELS_DIR
+              "/arm.urdf\nduration: 0.02\nstep: 2e-3\neffects:\n  gravity: [0, 0, -9.81]\n  damping: urdf\n  limits: urdf\n");
   const Outcome run = shell.linden("run a.yaml --json run.json");
   CHECK(run.exit_code == 0);
   CHECK(run.err.empty());
@@ -730,7 +785,8 @@ TEST_CASE("the program runs and inspects scenes", "[scene][command line]") {
 
   const Outcome facts = shell.linden("inspect a.yaml --json inspect.json");
   CHECK(facts.exit_code == 0);
-  CHECK_THAT(facts.out, Contains("gravity   0 0 -9.81 m/s^2") && Contains("damping   7 joints, 0.5 to 5 N m s/rad") && Contains("limits    7 joints"));
+  CHECK_THAT(facts.out, Contains("gravity   0 0 -9.81 m/s^2") && Contains("damping   7 joints, 0.5 to 5 N m s/rad") &&
+                            Contains("limits    7 joints"));
   const auto json = nlohmann::json::parse(text_of(shell / "inspect.json"));
   CHECK(json.at("effects").at("damping").size() == 7);
   CHECK(json.at("effects").at("damping")[0].at("joint") == "joint_1");
@@ -740,7 +796,9 @@ TEST_CASE("the program runs and inspects scenes", "[scene][command line]") {
 
 TEST_CASE("what the command line says goes over the scene", "[scene][command line]") {
   const Shell shell;
-  shell.write("a.yaml", "model: chain:4\nduration: 0.02\nstep: 2e-3\nsolver: riqn\ntolerance: 1e-9\ninitial: {seed: 3}\neffects: {gravity: [0, 0, -1]}\n");
+  shell.write("a.yaml",
+              "model: chain:4\nduration: 0.02\nstep: 2e-3\nsolver: riqn\ntolerance: 1e-9\ninitial: {seed: 3}\neffects: {gravity: "
+              "[0, 0, -1]}\n");
   const auto figures = [&](const std::string& options) {
     const Outcome outcome = shell.linden("run a.yaml --json a.json --record a.csv " + options);
     INFO(outcome.err);
@@ -754,7 +812,8 @@ TEST_CASE("what the command line says goes over the scene", "[scene][command lin
   CHECK(scene_says.at("tolerance") == 1e-9);
   CHECK(scene_says.at("gravity") == nlohmann::json({0, 0, -1}));
   const std::string first = text_of(shell / "a.csv");
-  const auto over = figures("--dt 1e-3 --duration 0.03 --solver newton --tolerance 1e-11 --gravity 0,0,0 --guess ig1 --stop absolute");
+  const auto over =
+      figures("--dt 1e-3 --duration 0.03 --solver newton --tolerance 1e-11 --gravity 0,0,0 --guess ig1 --stop absolute");
   CHECK(over.at("step") == 1e-3);
   CHECK(over.at("steps") == 30);
   CHECK(over.at("solver") == "newton");

@@ -221,9 +221,14 @@ TEST_CASE("effects that make no sense are refused, each by its place", "[effects
   refused([&](Effects& e) { e.wrenches = {{.slot = 1, .from = 2, .to = 1}}; }, "wrenches[0]", "from 2 to 1");
   refused([&](Effects& e) { e.friction = {{leader, 1}, {leader, 2}}; }, "friction[1]", "named twice");
   refused([&](Effects& e) { e.limits = {{leader, -1, 1, 0}, {leader, -1, 1, 0}}; }, "limits[1]", "named twice");
-  refused([&](Effects& e) { e.servos = {{.row = leader, .stiffness = 1}, {.row = leader, .stiffness = 2}}; }, "servos[1]", "named twice");
+  refused(
+      [&](Effects& e) {
+        e.servos = {{.row = leader, .stiffness = 1}, {.row = leader, .stiffness = 2}};
+      },
+      "servos[1]", "named twice");
   refused([&](Effects& e) { e.ground = Ground{.normal = {0, 0, 2}}; }, "ground", "normal has length 2");
-  const HeightField field{.columns = 2, .rows = 2, .spacing_x = 1, .spacing_y = 1, .origin_x = 0, .origin_y = 0, .heights = {0, 0, 0}};
+  const HeightField field{
+      .columns = 2, .rows = 2, .spacing_x = 1, .spacing_y = 1, .origin_x = 0, .origin_y = 0, .heights = {0, 0, 0}};
   refused([&](Effects& e) { e.ground = Ground{.terrain = field}; }, "ground.terrain", "it has 3 heights");
   refused([&](Effects& e) { e.ground = Ground{.contacts = {{{2, {}, 0}, {1, {}, 0}}, {}}}; }, "ground", "in no order");
 }

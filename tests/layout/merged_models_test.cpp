@@ -26,7 +26,9 @@ Pose placed(double x, double y, double turn) {
 Pose placement(const Model& model, Index slot) {
   Pose pose = Pose::Identity();
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
+    for (int column = 0; column < 3; ++column) {
+      pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
+    }
     pose.translation()[row] = model.constants.tree_placement(slot, 9 + row);
   }
   return pose;
@@ -77,7 +79,8 @@ void check_is_in(const PlacedModel& part, const Model& whole) {
     CHECK(whole.names.slot_of_joint.at(prefix + joint) == slot_of[static_cast<std::size_t>(slot)]);
   }
   for (const Mimic& mimic : model.mimics) {
-    const Index follower = slot_of[static_cast<std::size_t>(mimic.follower_slot)], leader = slot_of[static_cast<std::size_t>(mimic.leader_slot)];
+    const Index follower = slot_of[static_cast<std::size_t>(mimic.follower_slot)],
+                leader = slot_of[static_cast<std::size_t>(mimic.leader_slot)];
     const auto found = std::ranges::find(whole.mimics, follower, &Mimic::follower_slot);
     REQUIRE(found != whole.mimics.end());
     CHECK(found->leader_slot == leader);
