@@ -448,7 +448,10 @@ class Reader {
       if (const auto value = at.find("friction")) ground.friction = value->not_negative();
       if (const auto value = at.find("terrain")) ground.terrain = terrain(*value);
     }
-    ground.contacts = ground_contacts(model_);
+    std::vector<std::string> notes;
+    ground.contacts = contacts_of(model_, notes);
+    if (ground.contacts.empty()) notes.push_back("no link that moves has a collision shape: nothing touches it");
+    for (std::string& note : notes) warn(std::move(note));
     result_.effects.ground = std::move(ground);
   }
 
@@ -491,7 +494,5 @@ const std::vector<std::string>& effect_keys() { return kEffects; }
 SceneEffects read_effects(const SceneValue& at, const Model& model, const std::vector<double>& start, const std::string& folder) {
   return Reader(model, start, folder).read(at);
 }
-
-Contacts ground_contacts(const Model&) { return {}; }
 
 }  // namespace linden

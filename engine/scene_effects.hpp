@@ -44,7 +44,4 @@ const std::vector<std::string>& effect_keys();
 /// InputError with file and line.
 SceneEffects read_effects(const SceneValue& at, const Model& model, const std::vector<double>& start, const std::string& folder);
 
-/// Where the model's bodies touch the ground.
-Contacts ground_contacts(const Model& model);
-
 }  // namespace linden

@@ -12,11 +12,20 @@
 
 namespace linden {
 
+namespace {
+
+std::shared_ptr<const Model> checked(std::shared_ptr<const Model> model, const Effects& effects) {
+  check(effects, *model);
+  return model;
+}
+
+}  // namespace
+
 Simulation::Simulation(Model model, const Options& options, const Effects& effects)
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(std::move(model)), options_(options), plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
+    : model_(checked(std::move(model), effects)), options_(options), plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
       stepper_(*model_, options, plan_.get()) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);

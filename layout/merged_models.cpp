@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "layout/input_error.hpp"
+#include "layout/mesh_path.hpp"
 
 namespace linden {
 namespace {
@@ -28,6 +29,7 @@ class Merger {
     sort_bodies();
     lay_out();
     for (std::size_t part = 0; part < parts_.size(); ++part) add_names_of_all(part);
+    add_shapes();
     return std::move(model_);
   }
 
@@ -145,6 +147,24 @@ class Merger {
     for (const std::string& warning : from.warnings) {
       model_.warnings.push_back(parts_[part].name.empty() ? warning : parts_[part].name + ": " + warning);
     }
+  }
+
+  void add_shapes() {
+    const std::string& source = parts_.front().model.source;
+    const bool one_source = std::ranges::all_of(parts_, [&](const PlacedModel& part) { return part.model.source == source; });
+    if (one_source) model_.source = source;
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      const Model& from = parts_[part].model;
+      for (BodyShape shape : from.shapes) {
+        shape.slot = slot_of(part, shape.slot);
+        shape.link = prefixed(part, shape.link);
+        if (!one_source && shape.shape.kind == ShapeKind::mesh) {
+          if (const std::optional<std::string> file = find_mesh(shape.shape.mesh, from.source)) shape.shape.mesh = *file;
+        }
+        model_.shapes.push_back(std::move(shape));
+      }
+    }
+    std::ranges::stable_sort(model_.shapes, {}, &BodyShape::slot);
   }
 
   [[noreturn]] static void fail(const char* what, const std::string& name) {

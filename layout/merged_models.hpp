@@ -4,6 +4,7 @@
 //   slots      sorted anew by level and kind; within both, models in their order, bodies in theirs
 //   names      of links, joints and coordinates begin with the model's name and a slash, "left/elbow"; an empty name adds nothing
 //   pose       moves the roots: what a free root's position counts from as well as where a fixed one sits
+//   shapes     meshes are called by the whole path of their files where the models come from several files
 //   the rest   constants, attributes, mimic joints and warnings come along unchanged
 #pragma once
 

@@ -78,6 +78,14 @@ void check_is_in(const PlacedModel& part, const Model& whole) {
   for (const auto& [joint, slot] : model.names.slot_of_joint) {
     CHECK(whole.names.slot_of_joint.at(prefix + joint) == slot_of[static_cast<std::size_t>(slot)]);
   }
+  for (const BodyShape& shape : model.shapes) {
+    const auto found = std::ranges::find_if(whole.shapes, [&](const BodyShape& other) {
+      return other.link == prefix + shape.link && other.pose.matrix() == shape.pose.matrix() && other.shape.kind == shape.shape.kind &&
+             other.shape.size == shape.shape.size;
+    });
+    REQUIRE(found != whole.shapes.end());
+    CHECK(found->slot == slot_of[static_cast<std::size_t>(shape.slot)]);
+  }
   for (const Mimic& mimic : model.mimics) {
     const Index follower = slot_of[static_cast<std::size_t>(mimic.follower_slot)],
                 leader = slot_of[static_cast<std::size_t>(mimic.leader_slot)];
@@ -103,6 +111,7 @@ TEST_CASE("merged models keep their bodies, names, attributes and mimic joints",
                                        {load_urdf(kHand), "other hand", placed(3, 0, 0)}};
   const Model whole = merged(parts, "crowd");
   CHECK(whole.names.model == "crowd");
+  CHECK(std::ranges::is_sorted(whole.shapes, {}, &BodyShape::slot));
   Index bodies = 0, positions = 0;
   double mass = 0;
   std::size_t mimics = 0;
@@ -123,6 +132,24 @@ TEST_CASE("merged models keep their bodies, names, attributes and mimic joints",
     CHECK(whole.tree.level(i) >= whole.tree.level(i - 1));
     if (whole.tree.level(i) == whole.tree.level(i - 1)) CHECK(whole.tree.kind(i) >= whole.tree.kind(i - 1));
   }
+}
+
+TEST_CASE("meshes of merged models are found where they were", "[merged models]") {
+  Model one = chain(1), other = chain(1);
+  one.source = LINDEN_MODELS_DIR "/arm.urdf";
+  other.source = LINDEN_MODELS_DIR "/scenes/arm.urdf";
+  one.shapes = {{1, "link1", Pose::Identity(), {ShapeKind::mesh, {1, 1, 1}, "hand.urdf"}}};
+  other.shapes = {{1, "link1", Pose::Identity(), {ShapeKind::mesh, {1, 1, 1}, "../hand.urdf"}},
+                  {1, "link1", Pose::Identity(), {ShapeKind::mesh, {1, 1, 1}, "nowhere.stl"}}};
+  const Model apart = merged({{one, "a", Pose::Identity()}, {other, "b", Pose::Identity()}}, "two");
+  REQUIRE(apart.shapes.size() == 3);
+  CHECK(apart.source.empty());
+  CHECK(apart.shapes[0].shape.mesh == LINDEN_MODELS_DIR "/hand.urdf");
+  CHECK(apart.shapes[1].shape.mesh == LINDEN_MODELS_DIR "/hand.urdf");
+  CHECK(apart.shapes[2].shape.mesh == "nowhere.stl");
+  const Model together = merged({{one, "a", Pose::Identity()}, {one, "b", Pose::Identity()}}, "two");
+  CHECK(together.source == one.source);
+  CHECK(together.shapes[1].shape.mesh == "hand.urdf");
 }
 
 TEST_CASE("one model merged with nothing is itself", "[merged models]") {
