@@ -81,6 +81,13 @@ void begin_run(const RunArguments& arguments, Simulation& simulation) {
   if (!state.velocities.empty()) simulation.set_velocities(state.velocities);
 }
 
+/// Whether an effect takes momentum out of the system or brings it in.
+bool acts_from_outside(const RunArguments& arguments) {
+  if (!arguments.scene) return false;
+  const Effects& effects = arguments.scene->effects;
+  return !effects.wrenches.empty() || !effects.drag.empty() || effects.ground;
+}
+
 /// One run from its first sample to its files.
 class Execution {
  public:
@@ -89,7 +96,7 @@ class Execution {
     figures_.sampled_every = arguments.record.empty() ? (steps + kSamples - 1) / kSamples : 1;
     figures_.begin = simulation.time();
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
-    figures_.momentum = MomentumDrift::of(simulation);
+    if (!acts_from_outside(arguments)) figures_.momentum = MomentumDrift::of(simulation);
     if (!arguments.record.empty()) recorder_.emplace(arguments.record, simulation.model().names);
   }
 
@@ -156,10 +163,15 @@ class Execution {
 
   void sample() {
     const Energy energy = simulation_.energy();
-    figures_.energy.add(simulation_.time(), energy);
+    figures_.taken = simulation_.effect_work().taken();
+    figures_.given = simulation_.effect_work().given();
+    // what effects took is still in the account, what they gave is not
+    Energy account = energy;
+    account.potential += figures_.taken - figures_.given;
+    figures_.energy.add(simulation_.time(), account);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
     if (recorder_) recorder_->add(simulation_.time(), energy.total(), simulation_.positions());
-    if (!arguments_.plot.empty()) trace({simulation_.time(), energy.total() - figures_.energy.initial()});
+    if (!arguments_.plot.empty()) trace({simulation_.time(), account.total() - figures_.energy.initial()});
     last_sample_ = figures_.steps;
     next_sample_ = figures_.steps + figures_.sampled_every;
   }

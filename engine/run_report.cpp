@@ -88,6 +88,9 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
 
   const EnergyDrift& energy = figures.energy;
   row("energy", fmt::format("{:.6g} J at the start; kinetic energy up to {:.4g} J", energy.initial(), energy.scale()));
+  if (!effect_lines(effects, model).empty()) {
+    row("  work", fmt::format("effects took {:.6g} J and gave {:.6g} J, which the band below accounts for", figures.taken, figures.given));
+  }
   const bool scaled = energy.scale() > 0;
   row("  band", fmt::format("{:.2e} J{}", energy.band(),
                             scaled ? fmt::format(" = {:.2e} of the largest kinetic energy", energy.band() / energy.scale()) : ""));
@@ -169,6 +172,8 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"rounding_floor_steps", figures.floor_steps},
       {"residual_max", figures.largest_residual},
       {"energy_initial", energy.initial()},
+      {"energy_taken", figures.taken},
+      {"energy_given", figures.given},
       {"energy_band", energy.band()},
       {"energy_slope", if_any(true, energy.slope())},
       {"energy_slope_error", if_any(true, energy.slope_error())},
@@ -206,8 +211,10 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
                                options.step, counted(figures.steps, "step"), gravity_text(options), start_text(arguments, figures),
                                energy.initial());
   chart.x.label = "time [s]";
-  chart.y.label = scaled ? fmt::format("H \u2212 H(0), share of the largest kinetic energy ({:.4g} J)", energy.scale())
-                         : "H \u2212 H(0) [J]";
+  const bool effects = !effect_lines(effects_of(arguments), simulation.model()).empty();
+  const char* drift = effects ? "H \u2212 H(0) \u2212 work of effects" : "H \u2212 H(0)";
+  chart.y.label = scaled ? fmt::format("{}, share of the largest kinetic energy ({:.4g} J)", drift, energy.scale())
+                         : fmt::format("{} [J]", drift);
   chart.series.push_back(std::move(curve));
   return chart;
 }

@@ -24,9 +24,10 @@ struct RunFigures {
   int most_iterations = 0;
   std::int64_t split_steps = 0, floor_steps = 0;
   double largest_residual = 0;
-  EnergyDrift energy;
+  EnergyDrift energy;          // of H plus what effects took less what they gave
+  double taken = 0, given = 0;  // by effects since the first sample [J]
   std::optional<MomentumDrift> momentum;
-  std::vector<plot::Point> trace;  // H - H0 [J] over time, for the picture
+  std::vector<plot::Point> trace;  // drift of that energy [J] over time, for the picture
   std::string failure;             // what Simulation::describe says of the step that failed
   int signal = 0;                  // that ended the run
 

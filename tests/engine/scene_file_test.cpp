@@ -356,8 +356,9 @@ TEST_CASE("the ground is a plane, tilted or with heights", "[scene]") {
   CHECK(e.ground->terrain->origin_x == -1);
   CHECK(e.ground->terrain->origin_y == -2);
   CHECK(e.ground->terrain->heights == std::vector<double>{0, 1, 2, 3, 4, 5});
-  const Effects plain = effects("model: chain:2\n", "  ground:\n");
+  const Effects plain = effects("model: humanoids:2\n", "  ground:\n");
   REQUIRE(plain.ground);
+  CHECK(plain.ground->contacts.spheres.size() == 2 * 8 * 15);  // of 31 bodies 16 are the small ones between two hinges
   CHECK(plain.ground->stiffness == Ground().stiffness);
   CHECK(plain.ground->normal == std::array<double, 3>{0, 0, 1});
 }
@@ -686,6 +687,7 @@ TEST_CASE("what is named and does nothing is said", "[scene]") {
   warned("limits: urdf", "no joint has any");
   warned("spring: {}", "no joint has any");
   warned("drag: {wind: [1, 0, 0]}", "no body has any");
+  warned("ground: {}", "nothing touches it");
   warned("servo: {stiffness: 5, max_force: 0}", "3 of 3 servos have no strength");
   CHECK(scene("model: chain:3\neffects:\n  damping: 1\n").model.warnings.empty());
 }
@@ -744,10 +746,18 @@ TEST_CASE("mangled scenes are read or refused, and nothing else", "[scene]") {
     for (int k = 0; k < changes; ++k) {
       const std::size_t at = random.below(text.size()), length = std::min<std::size_t>(random.below(12), text.size() - at);
       switch (random.below(4)) {
-        case 0: text.erase(at, length); break;
-        case 1: text.insert(at, pieces[random.below(std::size(pieces))]); break;
-        case 2: text[at] = static_cast<char>(random.below(128)); break;
-        default: text.insert(random.below(text.size()), text.substr(at, length)); break;
+        case 0:
+          text.erase(at, length);
+          break;
+        case 1:
+          text.insert(at, pieces[random.below(std::size(pieces))]);
+          break;
+        case 2:
+          text[at] = static_cast<char>(random.below(128));
+          break;
+        default:
+          text.insert(random.below(text.size()), text.substr(at, length));
+          break;
       }
       if (text.empty()) text = "x";
     }
@@ -792,6 +802,26 @@ TEST_CASE("the program runs and inspects scenes", "[scene][command line]") {
   CHECK(json.at("effects").at("damping")[0].at("joint") == "joint_1");
   CHECK(json.at("effects").at("limits")[1].at("lower") == -2.05);
   CHECK(json.at("duration") == 0.02);
+}
+
+TEST_CASE("a run accounts for what effects take and give", "[scene][command line]") {
+  const Shell shell;
+  const auto figures = [&](const std::string& file) {
+    const Outcome outcome = shell.linden("run '" + kScenes + file + "' --duration 2 --json a.json --plot a.svg");
+    CHECK(outcome.exit_code == 0);
+    CHECK(outcome.err.empty());
+    CHECK_THAT(outcome.out, Contains("  work      effects took"));
+    return nlohmann::json::parse(text_of(shell / "a.json"));
+  };
+  const auto pendulum = figures("pendulum_damped.yaml");
+  CHECK(pendulum.at("energy_taken") > 0.02);
+  CHECK(pendulum.at("energy_given") == 0);
+  CHECK(pendulum.at("energy_band").get<double>() < 1e-4 * pendulum.at("energy_scale").get<double>());
+  const auto arm = figures("arm_servo.yaml");
+  CHECK(arm.at("energy_given") > 10);
+  CHECK(arm.at("energy_band").get<double>() < 1e-3 * arm.at("energy_scale").get<double>());
+  // the ground takes momentum, a servo does not
+  CHECK(figures("humanoid_drop.yaml").at("momentum_drift_linear").is_null());
 }
 
 TEST_CASE("what the command line says goes over the scene", "[scene][command line]") {
