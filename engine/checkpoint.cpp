@@ -1,8 +1,9 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
-//   "linden checkpoint 1\n"
+//   "linden checkpoint 2\n"
 //   header: model hash, step, gravity, counts, steps taken, valid rows of history (little endian, as laid out below)
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
+//   what effects keep from step to step, likewise
 //   FNV-1a over all of it
 //
 // Raw bits, so that a run continued from it is bit-identical. Written beside the target and renamed: nothing half-written stays.
@@ -19,7 +20,7 @@
 namespace linden {
 namespace {
 
-constexpr std::string_view kMagic = "linden checkpoint 1\n";
+constexpr std::string_view kMagic = "linden checkpoint 2\n";
 
 struct Header {
   std::uint64_t model_hash;
@@ -44,7 +45,7 @@ void append(std::string& bytes, const T* values, std::size_t count) {
 
 }  // namespace
 
-void Simulation::save(const std::string& file) const {
+void Simulation::save(const std::string& file) {
   const Header header{model_->hash(),
                       options_.step,
                       {options_.gravity[0], options_.gravity[1], options_.gravity[2]},
@@ -57,6 +58,7 @@ void Simulation::save(const std::string& file) const {
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
     append(bytes, field.flat().data(), field.flat().size());
   });
+  for (const std::span<double> numbers : stepper_.effect_memory()) append(bytes, numbers.data(), numbers.size());
   const std::uint64_t sum = checksum(bytes);
   append(bytes, &sum, 1);
 
@@ -89,6 +91,8 @@ void Simulation::load(const std::string& file) {
   }
   std::size_t expected = body + sizeof(std::uint64_t);
   State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) { expected += field.bytes(); });
+  const std::vector<std::span<double>> memory = stepper_.effect_memory();
+  for (const std::span<double> numbers : memory) expected += numbers.size_bytes();
   std::uint64_t sum = 0;
   std::memcpy(&sum, bytes.data() + bytes.size() - sizeof(sum), sizeof(sum));
   if (bytes.size() != expected || sum != checksum(std::string_view(bytes).substr(0, bytes.size() - sizeof(sum)))) {
@@ -99,6 +103,10 @@ void Simulation::load(const std::string& file) {
     std::memcpy(field.flat().data(), next, field.bytes());
     next += field.bytes();
   });
+  for (const std::span<double> numbers : memory) {
+    std::memcpy(numbers.data(), next, numbers.size_bytes());
+    next += numbers.size_bytes();
+  }
   state_ = loaded;
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);

@@ -26,6 +26,7 @@
 #include "kernels/effects/spring.hpp"
 #include "kernels/effects/torque.hpp"
 #include "kernels/effects/wrench.hpp"
+#include "kernels/impulse_up.hpp"
 #include "kernels/world_placement_down.hpp"
 #include "layout/workspace.hpp"
 
@@ -73,6 +74,8 @@ class EffectSweeps {
     const auto rows = [](Field<S>& field, std::size_t count) { field.allocate(static_cast<Index>(count)); };
     if (plan.joints) {
       sum_.allocate(tree_.shape);
+      last_.allocate(tree_.shape.velocities);
+      even_.allocate(tree_.shape.velocities);
       force_.resize(effects.torques.size());
       servos_.entries = effects.servos;
       servos_.share = plan.servo_share;
@@ -127,6 +130,7 @@ class EffectSweeps {
   void begin(double time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
     h_ = h;
     q_ = &q;
+    creep_ = 0;
     ground_before_ = ground_potential_;
     if (plan_.bodies) {
       for (std::size_t k = 0; k < scale_.size(); ++k) {
@@ -137,7 +141,7 @@ class EffectSweeps {
     if (!plan_.joints) return;
     for (std::size_t k = 0; k < force_.size(); ++k) force_[k] = plan_.effects.torques[k].force.at(time);
     std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
-    guess_friction(frictions_, delta);
+    begin_friction(frictions_, past, known, delta);
     begin_limits(limits_, plan_.q_row, h, q, past, known, delta);
     assemble();
   }
@@ -150,12 +154,12 @@ class EffectSweeps {
       clear_body(bodies_, body->slot);
       drag_map(drags_, body->drag.first, body->drag.last, constants, h_, displacement, bodies_, impulse);
       wrench_map(wrenches_, body->wrenches.first, body->wrenches.last, h_, displacement, bodies_, impulse);
-      ground_map(plan_.ground, body->points.first, body->points.last, h_, displacement, points_, bodies_, impulse);
+      ground_map(plan_.ground, body->points.first, body->points.last, h_, creep_, displacement, points_, bodies_, impulse);
     }
   }
-  /// Before the first of them: which points slide, as the first guess has it.
-  void guess_points(const Field<S, 7>& displacement) {
-    guess_ground(plan_.ground, h_, displacement, points_);
+  /// Before the first of them: which points slide, as the first guess and the last step have it. `known`: that was one of these sweeps.
+  void guess_points(const Field<S, 7>& displacement, bool known) {
+    guess_ground(plan_.ground, h_, known, displacement, points_);
     std::ranges::copy(points_.closed.flat(), points_.factored.flat().begin());
   }
 
@@ -187,21 +191,85 @@ class EffectSweeps {
     return changed;
   }
 
+  /// What the next step wants to know of this one: where contact points stick and how they moved, and what velocities are read with.
+  auto memory() {
+    known_ = true;
+    return std::array{points_.closed.flat(), points_.slides.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
+                      bodies_.last.flat(), bodies_.even.flat(), last_.flat(), even_.flat()};
+  }
+
+  /// Friction that is smooth up to this speed, until harden. joints() then goes by delta alone.
+  void soften(double creep) { creep_ = creep; }
+  /// Friction as it is again, from the states that the smooth one has led to.
+  void harden() {
+    creep_ = 0;
+    if (plan_.joints) assemble();
+  }
+  bool soft() const { return creep_ > 0; }
+  /// While soft: states by the value of delta.
+  void follow(const Field<S>& delta) {
+    revise_servos(servos_, plan_.q_row, h_, *q_, delta);
+    guess_friction(frictions_, h_, creep_, delta);
+    assemble();
+  }
+  /// While soft: as revise, for limits alone, which are not smooth.
+  template <class Mask>
+  auto revise_hard(const Field<S>& residual, const Mask& settled, Field<S>& delta) {
+    return revise_limits(limits_, residual, settled, delta);
+  }
+
   /// Impulses of the beginning become those of the end, but for being seen from the new poses.
-  void end_bodies(const Field<S, 12>& placement, Field<S, 6>& impulse) {
+  void end_bodies(const Field<S, 12>& placement, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    for (const TouchedBody& body : plan_.touched) {
+      const auto D = load<Displacement, S>(displacement, body.slot);
+      store(bodies_.uneven, body.slot, carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
+      for (int k = 0; k < 6; ++k) {
+        const S& uneven = bodies_.uneven(body.slot, k);
+        bodies_.even(body.slot, k) = lasting(uneven, bodies_.last(body.slot, k));
+        bodies_.last(body.slot, k) = uneven;
+      }
+    }
     add_given_up(tree_, placement, bodies_.given, impulse);
     keep_ground(points_);
+    known_ = true;
   }
 
   /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
-  void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) const {
+  void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) {
+    const S half(0.5);
     joint_impulses_end_map(sum_, h_, delta, end);
     if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
-    const S most = as<S>(std::numeric_limits<double>::max());
-    const auto release = [&](Index row) { residual(row) = select(sum_.stiffness(row) > most, S(0.0), residual(row)); };
-    for (const JointFriction& friction : frictions_.entries) release(friction.row);
-    for (const JointLimit& limit : limits_.entries) release(limit.row);
+    const S most = as<S>(std::numeric_limits<double>::max()), zero(0.0);
+    for (Index row = 0; row < end.rows(); ++row) {
+      S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
+      if (plan_.rotor.rows() > 0) uneven = uneven + as<S>(plan_.rotor(row)) * delta(row);
+      const auto held = sum_.stiffness(row) > most;
+      // the step that comes to rest is an impact
+      uneven = select(held, select(delta(row) == zero, uneven + half * residual(row), zero), uneven);
+      residual(row) = select(held, zero, residual(row));
+      even_(row) = lasting(uneven, last_(row));
+      last_(row) = uneven;
+    }
+    known_ = true;
   }
+
+  /// p with the impulses of the last step taken half at each of its ends: what velocities are read from.
+  template <class Element>
+  void even_out(const BodyConstants<Element>& constants, const Field<S, 12>& placement, Field<S, 6>& scratch, Field<S>& projected,
+                Field<S>& p) const {
+    if (!known_ || h_ == S(0.0)) return;
+    const S rate = S(1.0) / h_;
+    if (plan_.bodies) {
+      std::ranges::copy(bodies_.even.flat(), scratch.flat().begin());
+      impulse_up(tree_, constants, placement, scratch, projected);
+      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + rate * projected(row);
+    }
+    if (plan_.joints) {
+      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + rate * even_(row);
+    }
+  }
+  /// The state is another's from now on.
+  void forget() { known_ = false; }
 
   /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
   /// last step; `known`: it was one of these sweeps.
@@ -241,8 +309,8 @@ class EffectSweeps {
     damping_map(effects.damping, plan_.damping_share, h_, sum_);
     torque_map(effects.torques, force_, h_, sum_);
     servo_map(servos_, plan_.q_row, h_, *q_, sum_);
-    friction_map(frictions_, h_, sum_);
-    hold_friction(frictions_, sum_);
+    friction_map(frictions_, h_, creep_, sum_);
+    if (creep_ == 0) hold_friction(frictions_, sum_);
     hold_limits(limits_, sum_);
   }
   void clear_bodies() {
@@ -252,6 +320,9 @@ class EffectSweeps {
   const EffectPlan& plan_;
   const Tree& tree_;
   S h_{};
+  double creep_ = 0;
+  bool known_ = false;   // the last step was one of these sweeps
+  Field<S> last_, even_;  // of joints, as BodyImpulses has them of bodies
   const Field<S>* q_ = nullptr;
   JointImpulses<S> sum_;
   Servos<S> servos_;

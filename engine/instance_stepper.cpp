@@ -31,6 +31,7 @@ std::span<double> InstanceStepper::applied() {
 }
 
 void InstanceStepper::refresh() {
+  stepper_.forget();
   if (!applied_.empty()) stepper_.apply(applied_);
   if (constants_.inertia.rows() > 0) sum_subtree_masses(model_.tree, constants_);
   stepper_.refresh(state_);

@@ -46,13 +46,14 @@ void Simulation::check_row_count(const char* what, std::size_t found, Index expe
 
 void Simulation::changed() {
   history_ = 0;
+  stepper_.forget();
   std::ranges::fill(state_.history.flat(), 0.0);
   std::ranges::fill(state_.pace.flat(), std::numeric_limits<double>::quiet_NaN());
   stepper_.refresh(state_);
 }
 
 std::vector<double> Simulation::velocities() {
-  stepper_.velocity_of(state_.p, rate_);
+  stepper_.read_velocity(state_.p, rate_);
   return {rate_.flat().begin(), rate_.flat().end()};
 }
 
@@ -98,7 +99,7 @@ StepReport Simulation::step() {
 Energy Simulation::energy() { return stepper_.energy_of(state_.p, rate_); }
 
 Momentum Simulation::momentum() {
-  stepper_.velocity_of(state_.p, rate_);
+  stepper_.read_velocity(state_.p, rate_);
   const Wrench<double> h = stepper_.total_momentum(rate_);
   return {{h.n.x, h.n.y, h.n.z}, {h.f.x, h.f.y, h.f.z}};
 }

@@ -68,7 +68,7 @@ class Simulation {
 
   /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step
   /// or gravity, a file that is cut short or is no checkpoint; the simulation is then unchanged.
-  void save(const std::string& file) const;
+  void save(const std::string& file);
   void load(const std::string& file);
 
  private:

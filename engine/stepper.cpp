@@ -41,6 +41,13 @@ constexpr int kMostRevisions = 60;
 /// From then on they are made one by one.
 constexpr int kBulkRevisions = 5;
 
+/// Where they do not settle: speeds up to which friction is made smooth, one after the other [m/s, rad/s].
+constexpr double kSoftCreeps[] = {1e-2, 1e-4, 1e-6};
+constexpr int kMostSoftCorrections = 30;
+
+/// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
+constexpr double kSteepest = 0.5;
+
 /// Relative residual from which on impulses that hold a joint or a contact are those of the solution, but for this much.
 constexpr double kSettled = 1e-4;
 
@@ -63,7 +70,10 @@ Stepper::Stepper(const Model& model, const Options& options, const EffectPlan* p
   work_.allocate(model.tree.shape);
   last_good_.allocate(model.tree.shape);
   if (plan != nullptr && plan->any()) effects_ = std::make_unique<EffectSweeps<double>>(*plan, model);
-  if (effects_) before_.allocate(model.tree.shape.velocities);
+  if (effects_) {
+    before_.allocate(model.tree.shape.velocities);
+    before_innovation_.allocate(model.tree.shape.velocities);
+  }
 }
 
 void Stepper::refresh(const State<double>& state) {
@@ -174,12 +184,13 @@ Stepper::Evaluated Stepper::evaluate(StepReport& report, const Motions& motions)
 void Stepper::act(Evaluated& now) {
   const EffectPlan& plan = effects_->plan();
   if (plan.bodies) {
-    if (guess_points_) effects_->guess_points(work_.displacement);
+    if (guess_points_) effects_->guess_points(work_.displacement, known_);
     guess_points_ = false;
     effects_->bodies(all_slots(model_.tree), *constants_, work_.displacement, work_.impulse);
   }
   if (plan.joints) {
     if (plan.balls) displacement_map(model_.tree, work_.motion, work_.delta);
+    if (effects_->soft()) effects_->follow(work_.delta);
     effects_->joints(work_.delta, work_.motion, work_.momentum_target);
     now.energy += armature_energy<double>(plan.effects.armature, work_.delta);
   }
@@ -341,6 +352,13 @@ void Stepper::begin_effects(const State<double>& state, int history, double h) {
   }
   effect_scale_ = fall(h);
   guess_points_ = true;
+  known_ = history > 0;
+}
+
+std::vector<std::span<double>> Stepper::effect_memory() {
+  if (!effects_) return {};
+  const auto memory = effects_->memory();
+  return {memory.begin(), memory.end()};
 }
 
 /// Whether the state of an effect changed; work_.delta then says what the motion is to be.
@@ -460,13 +478,67 @@ bool Stepper::gains_energy(const State<double>& state, double h) {
   const double before = state.pace(0, 0);
   double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + work(work_.force));
   if (effects_) {
-    solved_work_ = effects_->work(left(), work_.delta, before_, state.pace(0, 0) > 0);
+    solved_work_ = effects_->work(left(), work_.delta, before_, known_);
     // forces that nearly balance leave less kinetic energy than their works, taken half a step apart, differ by
     double activity = effects_->activity(solved_work_, work_.motion, work_.delta) + effect_potential_;
     for (Index row = 0; row < model_.tree.shape.velocities; ++row) activity += std::abs(work_.force(row) * work_.delta(row));
     gain -= activity;
   }
   return gain > kMostGain * std::max(kinetic_, before);
+}
+
+/// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so.
+///
+/// With smooth friction the solution of the step minimises a function, convex but for the coupling of friction to the load it goes with,
+/// whose gradient is the residual; each correction is cut to where it falls no further. Its slope along a correction is r.(A^-1 r_before),
+/// the sum of u (d^-1 u_before): known from the passes.
+template <class Start>
+void Stepper::approach_softly(Evaluated& now, double& norm, const Start& start, StepReport& report) {
+  for (const double creep : kSoftCreeps) {
+    effects_->soften(creep);
+    displacement_map(model_.tree, work_.motion, work_.delta);
+    now = evaluate(report, start);
+    norm = factor_and_pass(now, report);
+    for (int k = 0; k < kMostSoftCorrections; ++k) {
+      if (!now.usable() || !std::isfinite(norm)) return;
+      const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
+      if (effects_->revise_hard(left(), settled, work_.delta)) {
+        displacement_map(model_.tree, work_.motion, work_.delta);
+        now = evaluate(report, start);
+        norm = factor_and_pass(now, report);
+        continue;
+      }
+      if (settled) break;
+      std::ranges::copy(work_.innovation.flat(), before_innovation_.flat().begin());
+      const double slope_before = slope_along();
+      now = solve_and_correct(report);
+      double taken = 1;
+      for (int cut = 0; cut < kMaxBacktracks; ++cut) {
+        double share = 0.5;
+        if (now.usable()) {
+          norm = pass_up(now);
+          const double slope = slope_along();
+          if (slope > -kSteepest * slope_before) break;
+          share = std::clamp(slope_before / (slope_before - slope), 0.1, 0.9);
+        }
+        now = correct(taken * (share - 1), report);
+        taken *= share;
+      }
+      if (now.usable()) norm = factor_and_pass_again(now, report);
+    }
+  }
+}
+
+/// u.(d^-1 u_before), summed over the joints.
+double Stepper::slope_along() const {
+  double sum = 0;
+  up(model_.tree, [&](auto joint, Index i) {
+    const Index row = model_.tree.first_v(i);
+    const Wrench<double> u = load_joint(joint, work_.innovation, row);
+    const Wrench<double> given = yield(joint, work_.joint_inverse, model_.tree.first_block(i), load_joint(joint, before_innovation_, row));
+    sum += dot(u.n, given.n) + dot(u.f, given.f);
+  });
+  return sum;
 }
 
 StepStatus Stepper::find_root(const State<double>& state, int history, double h, StepReport& report) {
@@ -511,6 +583,15 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   const bool revises = effects_ && effects_->plan().revises;
   int revisions = 0;
   const auto revised = [&](bool settled) {
+    if (revises && revisions == kBulkRevisions && one_pass_) {
+      revisions += 1;
+      approach_softly(now, norm, start, report);
+      effects_->harden();
+      displacement_map(model_.tree, work_.motion, work_.delta);
+      now = evaluate(report, start);
+      norm = factor_and_pass(now, report);
+      return fresh = true;
+    }
     if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kMostRevisions || !revise_effects(settled, revisions >= kBulkRevisions)) return false;
     revisions += 1;
     report.iterations += 1;
@@ -575,7 +656,7 @@ void Stepper::finish(State<double>& state, int& history, double h) {
   const double work_at_begin = work(work_.force);
   const bool joints = effects_ && effects_->plan().joints;
   if (joints) effects_->end_joints(work_.delta, work_.motion, one_pass_ ? work_.innovation : work_.residual, work_.increment);
-  if (effects_ && effects_->plan().bodies) effects_->end_bodies(work_.placement, work_.impulse);
+  if (effects_ && effects_->plan().bodies) effects_->end_bodies(work_.placement, work_.displacement, work_.impulse);
   for (Index row = 0; row < tree.shape.velocities; ++row) {
     for (int k = kHistory - 1; k > 0; --k) state.history(row, k) = state.history(row, k - 1);
     state.history(row, 0) = work_.delta(row);
@@ -615,10 +696,26 @@ void Stepper::velocity_of(const Field<double>& p, Field<double>& v) {
   apply_mass_inverse(p, v);
 }
 
+void Stepper::forget() {
+  if (effects_) effects_->forget();
+}
+
+const Field<double>& Stepper::read_velocity(const Field<double>& p, Field<double>& v) {
+  if (!effects_) {
+    velocity_of(p, v);
+    return p;
+  }
+  read_ = p;
+  effects_->even_out(*constants_, work_.placement, work_.impulse, work_.increment, read_);
+  fold_mimics(ties_.mimics(), read_);
+  velocity_of(read_, v);
+  return read_;
+}
+
 Energy Stepper::energy_of(const Field<double>& p, Field<double>& rate) {
-  velocity_of(p, rate);
+  const Field<double>& read = read_velocity(p, rate);
   double kinetic = 0;
-  for (Index row = 0; row < p.rows(); ++row) kinetic += 0.5 * p(row) * rate(row);
+  for (Index row = 0; row < p.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
   return {kinetic, potential_};
 }
 

@@ -55,11 +55,17 @@ class Stepper {
 
   /// One step of `h` seconds, `time` at its beginning. `history`: how many rows of state.history are valid; updated.
   StepReport step(State<double>& state, int& history, double time, double h);
+  /// What effects keep from step to step beside the state: part of a checkpoint.
+  std::vector<std::span<double>> effect_memory();
   /// Of effects, in the step taken last.
   const EffectWork<double>& effect_work() const { return effect_work_; }
 
+  /// The state is another's from now on, or was changed: nothing is known of a step before.
+  void forget();
   /// v = M(q)^-1 p, for the positions of the last refresh or step.
   void velocity_of(const Field<double>& p, Field<double>& v);
+  /// The same for people: of a state at the end of a step with effects, see kernels/effects/body_impulses.hpp. Returns that p.
+  const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
   /// p = M(q) v.
   void momentum_of(const Field<double>& v, Field<double>& p);
   /// Momentum of the whole system about the world's origin, in the world's frame, for rates v.
@@ -103,6 +109,9 @@ class Stepper {
   void act(Evaluated& now);
   bool revise_effects(bool settled, bool one_by_one);
   double fall(double h) const;
+  double slope_along() const;
+  template <class Start>
+  void approach_softly(Evaluated& now, double& norm, const Start& start, StepReport& report);
   const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
   double work(const Field<double>& force) const;
   bool at_rounding_floor(const Evaluated& now, double norm, double h, double epsilons) const;
@@ -130,10 +139,12 @@ class Stepper {
   double failed_residual_ = 0;  // of the last solve that failed
   std::unique_ptr<EffectSweeps<double>> effects_;  // null: none
   EffectWork<double> effect_work_, solved_work_;  // of the whole step; of the root found last
-  Field<double> before_;       // displacement of the step before, as far as it is known [rad, m]
+  Field<double> before_;         // displacement of the step before, as far as it is known [rad, m]
+  Field<double> before_innovation_, read_;
   double effect_potential_ = 0;  // at the beginning of the step [J]
   double time_ = 0, effect_scale_ = 0;
   bool guess_points_ = false;  // no evaluation of this solve has been made yet
+  bool known_ = false;         // the last step is one of this stepper
   std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;

@@ -6,6 +6,10 @@
 //   the rest at the end, at a + D            D = displacement of the point, body frame at k
 //   Jacobian                                 K_i += s h^2 J_a^T H R J_c,    H = -dF/dD,  J_c = [-c^ 1],  R of dT
 //
+// For people, who take the velocities of a state to be M^-1 p, what lasts of the impulses of the beginning is moved half to the end
+// (`even`): p of a robot at rest, whose ground pushes at the beginning of a step and whose weight pulls half at its end, would seem to
+// move by h g / 2.
+//
 // Both shares as one wrench in space, in the body frame at k, are `given`: summed over subtrees they turn the impulses of the beginning
 // of a step into those of its end (momentum_update_map). H is taken about the point c that F's law looks at.
 //
@@ -25,6 +29,9 @@ namespace linden {
 #define LINDEN_BODY_IMPULSES_FIELDS(FIELD)                                                                \
   FIELD(Scalar, pose, 12, slots, "T: body -> world at q; rotation row by row, shift [m]")                \
   FIELD(Scalar, given, 6, slots, "h x impulses of both ends, body frame at k; moment, force")            \
+  FIELD(Scalar, uneven, 6, slots, "h x impulses of the beginning less half of both ends, likewise")      \
+  FIELD(Scalar, last, 6, slots, "uneven of the last step")                                               \
+  FIELD(Scalar, even, 6, slots, "what lasted of uneven: what velocities are read with")                  \
   FIELD(Scalar, pull, 36, slots, "what K grows by, as a Mat6; zero of bodies that no effect touches")
 
 template <class Scalar>
@@ -40,18 +47,24 @@ LINDEN_INLINE Vec3<S> point_displacement(const Displacement<S>& D, const Vec3<S>
 
 template <class S>
 void clear_body(BodyImpulses<S>& sum, Index i) {
-  for (int k = 0; k < 6; ++k) sum.given(i, k) = S(0.0);
+  for (int k = 0; k < 6; ++k) sum.given(i, k) = sum.uneven(i, k) = S(0.0);
   for (int k = 0; k < 36; ++k) sum.pull(i, k) = S(0.0);
+}
+
+/// h^2 x wrenches of the beginning and of both ends.
+template <class S>
+LINDEN_INLINE void add_wrenches(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const Wrench<S>& begin, const Wrench<S>& both) {
+  store(impulse, i, load<Wrench, S>(impulse, i) - begin);
+  store(sum.given, i, load<Wrench, S>(sum.given, i) + both);
+  store(sum.uneven, i, load<Wrench, S>(sum.uneven, i) + (begin - S(0.5) * both));
 }
 
 /// force x h^2 at the point `arm`, which moves by `moved`.
 template <class S>
 LINDEN_INLINE void add_force(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const S& share, const Vec3<S>& arm, const Vec3<S>& moved,
                              const Vec3<S>& force) {
-  const Vec3<S> begin = share * force;
-  store(impulse, i, load<Wrench, S>(impulse, i) - Wrench<S>{cross(arm, begin), begin});
   const Vec3<S> middle = arm + (S(1.0) - share) * moved;
-  store(sum.given, i, load<Wrench, S>(sum.given, i) + Wrench<S>{cross(middle, force), force});
+  add_wrenches(sum, impulse, i, share * Wrench<S>{cross(arm, force), force}, Wrench<S>{cross(middle, force), force});
 }
 
 /// H x h^2 s, of a force at `arm` that depends on how the point c moves.

@@ -8,6 +8,9 @@
 // row is h times the impulse that holds it. Modes are revised within the solve until they are those of the solution (semismooth Newton,
 // the same as an active set): a sliding joint that would turn back holds, one that holds more than friction can starts to slide.
 //
+// Softly (creep > 0) it is f delta / (h creep) where |delta| < h creep, by the value of delta alone: what the solver goes by where sudden
+// revisions of many joints go round in circles. Its solution says which joints hold.
+//
 // The solution minimises the kinetic energy of the step plus f |delta|, so there is just one, and friction never gives energy. Taking
 // the whole impulse at the beginning shifts it by half a step: first order in h while sliding.
 //
@@ -37,19 +40,37 @@ LINDEN_INLINE S sign_of(const S& x) {
   return select(x > zero, one, select(x < zero, -one, zero));
 }
 
-/// The modes that a first guess of delta suggests.
+/// The modes that delta alone suggests; displacements below h creep hold.
 template <class S>
-void guess_friction(Frictions<S>& frictions, Field<S>& delta) {
+void guess_friction(Frictions<S>& frictions, const S& h, double creep, const Field<S>& delta) {
+  using std::abs;
+  const S still = h * as<S>(creep);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
-    frictions.mode(k) = sign_of(delta(frictions.entries[static_cast<std::size_t>(k)].row));
+    const S& d = delta(frictions.entries[static_cast<std::size_t>(k)].row);
+    frictions.mode(k) = select(abs(d) <= still, S(0.0), sign_of(d));
+  }
+}
+
+/// The modes to begin a step with: joints that held in the last one, where it is known, hold.
+template <class S, class Past, class Mask>
+void begin_friction(Frictions<S>& frictions, const Past& past, const Mask& known, Field<S>& delta) {
+  const S zero(0.0);
+  for (Index k = 0; k < frictions.mode.rows(); ++k) {
+    const Index row = frictions.entries[static_cast<std::size_t>(k)].row;
+    S& d = delta(row);
+    d = select(known && past(row, 1) == zero, zero, d);
+    frictions.mode(k) = sign_of(d);
   }
 }
 
 template <class S>
-void friction_map(const Frictions<S>& frictions, const S& h, JointImpulses<S>& sum) {
+void friction_map(const Frictions<S>& frictions, const S& h, double creep, JointImpulses<S>& sum) {
+  const S zero(0.0);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
     const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
-    add_impulse(sum, friction.row, 1, frictions.mode(k) * (h * h * as<S>(friction.force)), S(0.0));
+    const S f = h * as<S>(friction.force);
+    const S soft = creep > 0 ? select(frictions.mode(k) == zero, f / as<S>(creep), zero) : zero;
+    add_impulse(sum, friction.row, 1, frictions.mode(k) * (h * f), soft);
   }
 }
 

@@ -16,6 +16,8 @@
 // (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are revised within the solve until they are those of
 // the solution.
 //
+// Softly (creep > 0), as in friction.hpp: F_t = -friction N t / max(|t|, h creep).
+//
 // A rim of a cylinder stands as four points: the lowest of its circle, the highest, and the two between, found anew each step.
 //
 // units   gap, D [m]; k [N/m], c [N s/m] of one point
@@ -36,8 +38,8 @@ namespace linden {
 /// Speed at which a point that sticks creeps along at the limit of its friction: 60 micrometres a minute [m/s].
 inline constexpr double kCreep = 1e-6;
 
-/// Slower points are first taken to stick [m/s].
-inline constexpr double kStickingSpeed = 1e-3;
+/// Slower points are first taken to stick [m/s]: those that do creep by some kCreep.
+inline constexpr double kStickingSpeed = 20 * kCreep;
 
 #define LINDEN_GROUND_POINT_FIELDS(FIELD)                                                             \
   FIELD(Scalar, center, 3, slots, "of the sphere, body frame [m]")                                    \
@@ -165,23 +167,25 @@ S find_ground(const GroundPlan& plan, const Field<S, 12>& pose, GroundPoints<S>&
   return potential;
 }
 
-/// Which points are first taken to slide, from how the bodies moved in the first guess.
+/// Which points slide at first: those that did in the last step, where it is `known` and the ground pushed; of others those that are faster
+/// than kStickingSpeed.
 template <class S>
-void guess_ground(const GroundPlan& plan, const S& h, const Field<S, 7>& displacement, GroundPoints<S>& points) {
+void guess_ground(const GroundPlan& plan, const S& h, bool known, const Field<S, 7>& displacement, GroundPoints<S>& points) {
   const S still = as<S>(kStickingSpeed * kStickingSpeed) * h * h;
   for (Index k = 0; k < static_cast<Index>(plan.points.size()); ++k) {
     const GroundPoint& point = plan.points[static_cast<std::size_t>(k)];
     const auto n = load<Vec3, S>(points.normal, k);
     const Vec3<S> a = load<Vec3, S>(points.center, k) - as<S>(point.radius) * n;
     const Vec3<S> moved = point_displacement(load<Displacement, S>(displacement, point.slot), a), t = moved - dot(n, moved) * n;
-    points.slides(k) = select(dot(t, t) > still, S(1.0), S(0.0));
+    const S guess = select(dot(t, t) > still, S(1.0), S(0.0));
+    points.slides(k) = known ? select(points.closed(k) > S(0.0), points.slides(k), guess) : guess;
     store(points.slip, k, t);
   }
 }
 
 /// Points first ... last - 1.
 template <class S>
-void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& h, const Field<S, 7>& displacement,
+void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& h, double creep, const Field<S, 7>& displacement,
                 GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
   using std::max;
   using std::min;
@@ -214,10 +218,12 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
 
     const Vec3<S> t = moved - dot(n, moved) * n;
     const S length = sqrt(dot(t, t));
+    if (creep > 0) points.slides(k) = select(length > h * as<S>(creep), one, zero);
     const auto slides = points.slides(k) > zero;
-    const S per_length = select(length > zero, one / length, zero);
+    const S per_length = creep > 0 ? one / max(length, h * as<S>(creep)) : select(length > zero, one / length, zero);
     const Vec3<S> direction = per_length * t;
-    const S b = select(closed, select(slides, mu * N * per_length, stick * max(-stiff * gap, as<S>(plan.least_load))), zero);
+    const auto by_load = slides || S(creep) > zero;
+    const S b = select(closed, select(by_load, mu * N * per_length, stick * max(-stiff * gap, as<S>(plan.least_load))), zero);
     const Vec3<S> drag = -b * t, push = N * n;
 
     const Mat3<S> R = rotation(D.r);
@@ -225,14 +231,14 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     add_force(sum, impulse, i, one, a, moved, scale * drag);
     // -d(N n)/dD_c, -dF_t/dD_c through N, -dF_t/dD_a
     add_pull(sum, i, c, c, R, outer((scale * share * dN) * n, n));
-    add_pull(sum, i, a, c, R, outer(select(slides, -(scale * mu * dN), zero) * direction, n));
+    add_pull(sum, i, a, c, R, outer(select(by_load, -(scale * mu * dN), zero) * direction, n));
     const Mat3<S> across = diagonal(one) - outer(n, n) - select(slides, one, zero) * outer(direction, direction);
     add_pull(sum, i, a, a, R, (scale * b) * across);
 
     store(points.slip_before, k, load<Vec3, S>(points.slip, k));
     store(points.slip, k, t);
     points.closed(k) = select(closed, one, zero);
-    points.load(k) = select(closed && points.slides(k) == zero, b * length / (mu * N), zero);
+    points.load(k) = select(closed && !by_load, b * length / (mu * N), zero);
     points.push(k) = N;
     store(points.drag, k, drag);
     points.rise(k) = rise;

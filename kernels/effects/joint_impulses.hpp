@@ -79,6 +79,15 @@ LINDEN_INLINE S worked(double share, const S& delta, const S& before) {
   return delta - as<S>(share - 0.5) * (delta - before);
 }
 
+/// The smaller of two numbers of one sign, else zero: of an impulse, what lasted from step to step, without what an impact gave.
+template <class S>
+LINDEN_INLINE S lasting(const S& a, const S& b) {
+  using std::abs;
+  using std::min;
+  const S zero(0.0);
+  return select(a * b > zero, select(a > zero, min(a, b), -min(-a, -b)), zero);
+}
+
 /// What p gets at the end of the step.
 template <class S>
 void joint_impulses_end_map(const JointImpulses<S>& sum, const S& h, const Field<S>& delta, Field<S>& end) {

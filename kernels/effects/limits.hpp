@@ -54,7 +54,10 @@ void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const S& h, cons
     limits.highest(k) = highest;
     limits.lowest(k) = lowest;
     S& d = delta(limit.row);
-    limits.mode(k) = select(d >= highest, one, select(d <= lowest, -one, zero));
+    // a joint that rested on its limit rests on
+    const auto rests = known && past(limit.row, 1) == zero;
+    limits.mode(k) = select(d >= highest || (rests && up < slack), one, select(d <= lowest || (rests && down > -slack), -one, zero));
+    d = select(limits.mode(k) == one, highest, select(limits.mode(k) == -one, lowest, d));
     d = min(max(d, lowest), highest);
   }
 }

@@ -51,8 +51,7 @@ void wrench_map(Wrenches<S>& wrenches, std::size_t first, std::size_t last, cons
     }
     const Wrench<S> begin{half * (moment + cross(a, force)), half * force};
     const Wrench<S> end{half * (end_moment + cross(a + moved, end_force)), half * end_force};
-    store(impulse, i, load<Wrench, S>(impulse, i) - scale * begin);
-    store(sum.given, i, load<Wrench, S>(sum.given, i) + scale * (begin + end));
+    add_wrenches(sum, impulse, i, scale * begin, scale * (begin + end));
     wrenches.work(static_cast<Index>(k)) = half * (dot(force + end_force, moved) + dot(moment + end_moment, turn));
   }
 }
