@@ -1,6 +1,6 @@
 // bench/comparators/ancestry.hpp
-// Who lies above and below whom: what evaluations in generalized coordinates sum over. A body's velocity depends on the joints of its
-// path, a joint's coordinate moves the bodies of its subtree.
+// Who lies above and below whom: what evaluations in generalized coordinates sum over. A body's velocity depends on the joints of
+// its path, a joint's coordinate moves the bodies of its subtree.
 //
 // path(i)     slots from the root's child down to i itself
 // subtree(i)  slot i and all its descendants, parents before children

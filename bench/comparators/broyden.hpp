@@ -4,13 +4,13 @@
 //   s = -H r,  y = r(delta + s) - r(delta),  H <- H + (s - H y) (s^T H) / (s^T H y)
 //
 // The first H of a step:
-//   differences  a Jacobian by forward differences at the first guess, inverted: Broyden's own proposal, and what the GNU Scientific
-//                Library does, which the paper's published code calls. n further evaluations of the residual and an inversion.
+//   differences  a Jacobian by forward differences at the first guess, inverted: Broyden's own proposal, and what the GNU
+//                Scientific Library does, which the paper's published code calls. n further evaluations and an inversion.
 //   kept         the last H of the step before; differences in the very first step only. Not the paper's; shown because it is the
 //                cheaper habit where one step is like the next.
 //
 // cost    O(n^2) an iteration; with differences n evaluations and O(n^3) a step
-// source  Broyden, A class of methods for solving nonlinear simultaneous equations, 1965; the inverse form by Sherman and Morrison
+// source  Broyden, A class of methods for solving nonlinear simultaneous equations, 1965; inverse form by Sherman and Morrison
 #pragma once
 
 #include "bench/comparators/root_finder.hpp"

@@ -2,9 +2,11 @@
 
 #include "bench/comparators/drnea_derivative.hpp"
 #include "kernels/displacement_down.hpp"
+#include "kernels/increment_down.hpp"
 #include "kernels/momentum_map.hpp"
 #include "kernels/momentum_update_map.hpp"
 #include "kernels/motion_map.hpp"
+#include "kernels/newton_factor_up.hpp"
 #include "kernels/residual_up.hpp"
 
 namespace linden::comparators {
@@ -16,6 +18,7 @@ Drnea::Drnea(const Model& model) : model_(model), ancestry_(model.tree) {
   impulse_.allocate(shape.slots);
   target_.allocate(shape.velocities);
   residual_.allocate(shape.velocities);
+  factor_.allocate(shape);
 }
 
 void Drnea::begin(const StepStart& start) {
@@ -33,6 +36,17 @@ bool Drnea::residual(const Field<double>& delta, Field<double>& hr) {
 }
 
 void Drnea::jacobian(Eigen::MatrixXd& J) { drnea_derivative(model_, ancestry_, placement_, motion_, displacement_, J); }
+
+void Drnea::factor() {
+  const Gains<double> gains{factor_.gain_up, factor_.gain_down, factor_.joint_inverse};
+  newton_factor_up(model_.tree, model_.constants, placement_, motion_, displacement_, factor_.articulated, gains);
+}
+
+void Drnea::apply_inverse(const Field<double>& r, Field<double>& x) {
+  const Gains<double> gains{factor_.gain_up, factor_.gain_down, factor_.joint_inverse};
+  impulse_pass_up(model_.tree, model_.constants, placement_, gains, r, factor_.bias, factor_.innovation);
+  increment_down(model_.tree, model_.constants, placement_, motion_, gains, factor_.innovation, factor_.variation, x);
+}
 
 void Drnea::momentum(const StepStart& end, Field<double>& p) {
   momentum_update_map(model_.tree, model_.constants, end.h, displacement_, impulse_, residual_, end.work.force, p);

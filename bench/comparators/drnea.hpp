@@ -21,6 +21,12 @@ class Drnea : public Equation {
   void jacobian(Eigen::MatrixXd& J) override;
   void momentum(const StepStart& end, Field<double>& p) override;
 
+  Index rows() const { return target_.rows(); }
+  /// Factors the exact derivative where the residual was taken last, in O(n) (kernels/newton_factor_up.hpp) ...
+  void factor();
+  /// ... and applies its inverse.
+  void apply_inverse(const Field<double>& r, Field<double>& x);
+
  private:
   const Model& model_;
   Ancestry ancestry_;
@@ -28,6 +34,7 @@ class Drnea : public Equation {
   Field<double, 7> motion_, displacement_;
   Field<double, 6> impulse_;
   Field<double> target_, residual_;
+  Workspace<double> factor_;
 };
 
 }  // namespace linden::comparators

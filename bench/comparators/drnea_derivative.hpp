@@ -8,9 +8,9 @@
 //     d(h F_i)/dq_j = d(h mu_i)/dq_j + sum over children c of Ad_{(X_c^k)^-1}^T d(h F_c)/dq_j  line 9
 //     J_ij = S_i^T d(h F_i)/dq_j                                                              line 10
 //
-// The paper writes the derivative of dT as a 4 x 4 matrix; as a twist in the body's frame, it obeys the same recursion in six numbers.
-// Lines 5 and 8 are the same linear map for every column, K_i (kernels/se3.hpp, pose_derivative), and are formed once a body.
-// Outside the subtree of j and its path all is zero.
+// The paper writes the derivative of dT as a 4 x 4 matrix; as a twist in the body's frame it obeys the same recursion in six
+// numbers. Lines 5 and 8 are the same linear map for every column, K_i (kernels/se3.hpp, pose_derivative), and are formed once a
+// body. Outside the subtree of j and its path all is zero.
 //
 // reads   placement 12 x n at q^k, motion 7 x n, displacement 7 x n, of the residual
 // writes  J nv x nv, d(h r)/d(delta)

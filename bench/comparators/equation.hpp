@@ -1,6 +1,6 @@
 // bench/comparators/equation.hpp
-// A discrete Euler-Lagrange equation (3) in momentum form, as a root finder sees it: a residual, its derivative, and the momentum at the
-// end of the step.
+// A discrete Euler-Lagrange equation (3) in momentum form, as a root finder sees it: a residual, its derivative, and the momentum
+// at the end of the step.
 //
 //   h r(delta) = -h D1 L_d(q, q + delta) - h p = 0          p = D2 L_d of the step before
 //

@@ -6,6 +6,7 @@
 #include "bench/comparators/broyden.hpp"
 #include "bench/comparators/drnea.hpp"
 #include "bench/comparators/newton_dense.hpp"
+#include "bench/comparators/newton_linear.hpp"
 #include "bench/comparators/riqn.hpp"
 #include "bench/comparators/svi.hpp"
 #include "bench/comparators/svi_log.hpp"
@@ -34,12 +35,15 @@ std::unique_ptr<Equation> make(Evaluation evaluation, const Model& model) {
   throw std::invalid_argument("no such evaluation");
 }
 
-std::unique_ptr<RootFinder> make(RootFinding root_finding, const Model& model, Workspace<double>& work) {
+std::unique_ptr<RootFinder> make(RootFinding root_finding, const Model& model, Workspace<double>& work, Equation& equation) {
   switch (root_finding) {
     case RootFinding::riqn: return std::make_unique<Riqn>(model, work);
     case RootFinding::newton_dense: return std::make_unique<NewtonDense>();
     case RootFinding::broyden: return std::make_unique<Broyden>(FirstJacobian::differences);
     case RootFinding::broyden_kept: return std::make_unique<Broyden>(FirstJacobian::kept);
+    case RootFinding::newton_linear:
+      if (auto* const drnea = dynamic_cast<Drnea*>(&equation)) return std::make_unique<NewtonLinear>(*drnea);
+      throw std::invalid_argument("Newton in O(n) solves DRNEA's equation only");
   }
   throw std::invalid_argument("no such root finder");
 }
@@ -73,7 +77,7 @@ void acceleration(const Model& model, Workspace<double>& work, const Field<doubl
 }  // namespace
 
 std::string name(RootFinding root_finding, Evaluation evaluation) {
-  const char* const roots[] = {"RIQN", "Newton", "Broyden", "Broyden, kept"};
+  const char* const roots[] = {"RIQN", "Newton", "Broyden", "Broyden, kept", "Newton O(n)"};
   const char* const evaluations[] = {"DRNEA", "SVI", "SVI-log"};
   return std::string(roots[static_cast<int>(root_finding)]) + " + " + evaluations[static_cast<int>(evaluation)];
 }
@@ -84,7 +88,7 @@ Integrator::Integrator(const Model& model, const Settings& settings) : model_(mo
   work_.allocate(model.tree.shape);
   for (Field<double>* field : {&delta_, &residual_, &rate_}) field->allocate(model.tree.shape.velocities);
   equation_ = make(settings.evaluation, model);
-  root_finder_ = make(settings.root_finding, model, work_);
+  root_finder_ = make(settings.root_finding, model, work_, *equation_);
 }
 
 void Integrator::set(std::span<const double> q, std::span<const double> v) {

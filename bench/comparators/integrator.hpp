@@ -18,7 +18,7 @@
 namespace linden::comparators {
 
 enum class Evaluation { drnea, svi, svi_log };
-enum class RootFinding { riqn, newton_dense, broyden, broyden_kept };
+enum class RootFinding { riqn, newton_dense, broyden, broyden_kept, newton_linear };  // the last with DRNEA only
 enum class Guess {
   ig1,   // q^k+1 = q^k
   ig3,   // explicit acceleration, semi-implicit Euler
@@ -39,7 +39,8 @@ std::string name(RootFinding root_finding, Evaluation evaluation);
 
 class Integrator {
  public:
-  /// Throws std::invalid_argument for a model with joints of more than one degree of freedom or with mimic joints.
+  /// Throws std::invalid_argument for a model with joints of more than one degree of freedom or with mimic joints, and for
+  /// newton_linear with another evaluation than DRNEA.
   Integrator(const Model& model, const Settings& settings);
 
   void set(std::span<const double> q, std::span<const double> v);

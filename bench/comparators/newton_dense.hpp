@@ -3,8 +3,8 @@
 //
 //   delta <- delta - J(delta)^-1 h r
 //
-// J is the equation's own: Algorithm 4 of the paper with DRNEA (drnea_derivative.hpp), Johnson and Murphey's second derivatives with SVI.
-// LU with partial pivoting, by Eigen.
+// J is the equation's own: Algorithm 4 of the paper with DRNEA (drnea_derivative.hpp), Johnson and Murphey's second derivatives
+// with SVI. LU with partial pivoting, by Eigen.
 //
 // cost    the derivative, O(n^2) or O(n^3), and 2/3 n^3 operations for the LU
 #pragma once

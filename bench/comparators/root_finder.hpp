@@ -1,6 +1,6 @@
 // bench/comparators/root_finder.hpp
-// How a root of a discrete Euler-Lagrange equation is looked for (the paper's Algorithm 1, lines 2 to 6), without globalisation: a root
-// finder that leaves the range of the log map, or does not reach the tolerance, has failed, and says so.
+// How a root of a discrete Euler-Lagrange equation is looked for (the paper's Algorithm 1, lines 2 to 6), without globalisation:
+// a root finder that leaves the range of the log map, or does not reach the tolerance, has failed, and says so.
 #pragma once
 
 #include <cmath>

@@ -15,9 +15,10 @@
 //   dA_ij/dq_l, j above l  carried from l, there -ad_{S_l} A_lj
 //   dU_ij/dq_l, j to l     carried from l, there -ad_{S_l} U_lj
 //
-// The discrete Lagrangian is not the paper's (9), (10): both are of second order, and what they compute differs by O(h^2). svi_log.hpp
-// evaluates the paper's own equation the same way. What is published is kept: first and second derivatives of V are carried from body to
-// body for every coordinate and pair of coordinates; only coordinates of a body's path are looked at, and symmetry is used.
+// The discrete Lagrangian is not the paper's (9), (10): both are of second order, and what they compute differs by O(h^2).
+// svi_log.hpp evaluates the paper's own equation the same way. What is published is kept: first and second derivatives of V are
+// carried from body to body for every coordinate and pair of coordinates; only coordinates of a body's path are looked at, and
+// symmetry is used.
 //
 // cost    residual O(n^2), with the Jacobian O(n^3), for a chain
 // source  Johnson and Murphey, Scalable variational integrators for constrained mechanical systems in generalized coordinates,

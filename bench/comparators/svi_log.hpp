@@ -4,9 +4,9 @@
 //   -h D1 L_d,j = sum over bodies i of A_ij.(h mu_i) - h^2/2 Q_j,    A_ij = Ad_{T_ji^-1} S_j at q^k, carried from parent to child
 //   J_jl        = sum over bodies i of A_ij.(K_i B_il),              B_il the same at q^k+1
 //
-// Its residual is DRNEA's to rounding, at O(n^2) instead of O(n): what the recursion of DRNEA saves when all else is equal. A does not
-// depend on the unknown and is formed once a step, so this is a faster evaluation than the published one (svi.hpp), which has to
-// carry its derivatives anew with every iterate.
+// Its residual is DRNEA's to rounding, at O(n^2) instead of O(n): what the recursion of DRNEA saves when all else is equal. A
+// does not depend on the unknown and is formed once a step, so this is faster than the published evaluation (svi.hpp), which has
+// to carry its derivatives anew with every iterate.
 //
 // cost    residual O(n^2), Jacobian O(n^3), for a chain
 // source  the paper, (9)-(16)
