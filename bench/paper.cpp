@@ -12,8 +12,8 @@
 //
 // The chain is that of the paper's published code: planar, links of 1.5 m and 1 kg, positions and velocities uniform in +-pi/2,
 // h = 1 ms, |r| < 1e-9 n, first guess IG3, no gravity but in figure 2b. Times are processor time of the thread; contenders take
-// turns of a hundredth of a second, so that whatever else the machine does hits them alike. Nothing is extrapolated, and who fails a
-// step stops there.
+// turns of a hundredth of a second, so that whatever else the machine does hits them alike. Nothing is extrapolated, and who fails
+// a step stops there.
 #include <fmt/format.h>
 #include <time.h>
 
@@ -270,7 +270,7 @@ std::vector<Row> times(const Place& place, double budget) {
     rows.push_back(time_all(links, budget));
     for (const Timed& t : rows.back().timed) {
       const double frames = t.frames;
-      csv += fmt::format("{},{},\"{}\",{},{:.4g},{:.4g},{:.3g},{:.3g},{}\n", links, t.contender.evaluation,
+      csv += fmt::format("{},{},\"{}\",{},{:.4f},{:.3f},{:.3f},{:.2f},{}\n", links, t.contender.evaluation,
                          t.contender.root_finding, t.frames, t.seconds, 1e6 * t.per_frame(),
                          static_cast<double>(t.corrections) / frames, static_cast<double>(t.evaluations) / frames,
                          t.failed ? std::to_string(t.frames + 1) : "");

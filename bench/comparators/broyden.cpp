@@ -1,7 +1,5 @@
 #include "bench/comparators/broyden.hpp"
 
-#include <Eigen/LU>
-
 namespace linden::comparators {
 namespace {
 
@@ -23,7 +21,8 @@ void Broyden::begin(Equation& equation, const Field<double>& delta, const Field<
     if (!equation.residual(varied_, changed_)) break;  // the correction that follows will not be defined either
     J_.col(j) = (vector(changed_) - vector(hr)) / kDifference;
   }
-  H_ = J_.partialPivLu().inverse();
+  lu_.factor(J_);
+  lu_.inverse(H_);
 }
 
 void Broyden::correct(Equation&, const Field<double>& hr, Field<double>& delta) {

@@ -13,6 +13,7 @@
 // source  Broyden, A class of methods for solving nonlinear simultaneous equations, 1965; inverse form by Sherman and Morrison
 #pragma once
 
+#include "bench/comparators/dense_lu.hpp"
 #include "bench/comparators/root_finder.hpp"
 
 namespace linden::comparators {
@@ -29,6 +30,7 @@ class Broyden : public RootFinder {
 
   FirstJacobian first_;
   Eigen::MatrixXd J_, H_;
+  DenseLu lu_;
   Eigen::VectorXd s_, before_, Hy_;
   Eigen::RowVectorXd sH_;
   Field<double> varied_, changed_;

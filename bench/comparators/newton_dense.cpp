@@ -4,8 +4,10 @@ namespace linden::comparators {
 
 void NewtonDense::correct(Equation& equation, const Field<double>& hr, Field<double>& delta) {
   equation.jacobian(J_);
-  factor_.compute(J_);
-  vector(delta) -= factor_.solve(vector(hr));
+  lu_.factor(J_);
+  increment_ = vector(hr);
+  lu_.solve(increment_);
+  vector(delta) -= increment_;
 }
 
 }  // namespace linden::comparators

@@ -9,8 +9,7 @@
 // cost    the derivative, O(n^2) or O(n^3), and 2/3 n^3 operations for the LU
 #pragma once
 
-#include <Eigen/LU>
-
+#include "bench/comparators/dense_lu.hpp"
 #include "bench/comparators/root_finder.hpp"
 
 namespace linden::comparators {
@@ -20,7 +19,8 @@ class NewtonDense : public RootFinder {
   void correct(Equation& equation, const Field<double>& hr, Field<double>& delta) override;
 
   Eigen::MatrixXd J_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd increment_;
+  DenseLu lu_;
 };
 
 }  // namespace linden::comparators
