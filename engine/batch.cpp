@@ -85,17 +85,19 @@ struct BatchOf<Real>::Data {
   Instructions instructions;
   int lanes;
   int threads;
-  Numbers<Real> q, p, pace, applied, mass;
+  EffectPlan plan;
+  Numbers<Real> q, p, pace, applied, mass, contacts;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
   mutable oneapi::tbb::task_arena arena;
   mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
 
-  Data(std::shared_ptr<const Model> shared, std::int64_t count, const BatchOptions& given)
+  Data(std::shared_ptr<const Model> shared, std::int64_t count, const BatchOptions& given, const Effects& effects)
       : model(std::move(shared)), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
         instructions(given.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
         threads(given.threads > 0 ? given.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
+        plan(*model, options, effects),
         allowed(oneapi::tbb::global_control::max_allowed_parallelism,
                 std::max(static_cast<std::size_t>(threads),
                          oneapi::tbb::global_control::active_value(oneapi::tbb::global_control::max_allowed_parallelism))),
@@ -105,6 +107,7 @@ struct BatchOf<Real>::Data {
     q.resize(rows(shape().positions));
     p.resize(rows(shape().velocities));
     past.resize(rows(shape().velocities * kHistoryWords<Real>));
+    contacts.resize(rows(static_cast<Index>(plan.ground.points.size())));
     pace.assign(rows(2), std::numeric_limits<Real>::quiet_NaN());
     records.resize(static_cast<std::size_t>(size));
     const std::vector<double> neutral = model->neutral();
@@ -127,6 +130,7 @@ struct BatchOf<Real>::Data {
             pace.data() + at(b, 2),
             applied.empty() ? nullptr : applied.data() + at(b, nv),
             mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
+            contacts.empty() ? nullptr : contacts.data() + at(b, static_cast<Index>(plan.ground.points.size())),
             records.data() + b * lanes,
             static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
   }
@@ -134,8 +138,8 @@ struct BatchOf<Real>::Data {
   Worker& worker() const {
     Worker& mine = workers.local();
     if (!mine.block) {
-      mine.block = make<Real>(instructions, {*model, constants, options, !mass.empty()});
-      mine.instance = std::make_unique<InstanceStepper>(*model, options);
+      mine.block = make<Real>(instructions, {*model, constants, options, !mass.empty(), &plan});
+      mine.instance = std::make_unique<InstanceStepper>(*model, options, &plan);
     }
     return mine;
   }
@@ -175,18 +179,21 @@ struct BatchOf<Real>::Data {
     for (Index row = 0; row < 2; ++row) to_pace(i, row) = std::numeric_limits<Real>::quiet_NaN();
     const BatchView<std::uint32_t> to_past(past, shape().velocities * kHistoryWords<Real>, lanes);
     for (Index row = 0; row < to_past.rows(); ++row) to_past(i, row) = 0;
+    const BatchView<Real> to_contacts(contacts, static_cast<Index>(plan.ground.points.size()), lanes);
+    for (Index row = 0; row < to_contacts.rows(); ++row) to_contacts(i, row) = 0;
     records[static_cast<std::size_t>(i)] = {};
   }
 };
 
 template <class Real>
-BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& options)
-    : BatchOf(std::make_shared<const Model>(std::move(model)), size, options) {}
+BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& options, const Effects& effects)
+    : BatchOf(std::make_shared<const Model>(std::move(model)), size, options, effects) {}
 
 template <class Real>
-BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options) {
+BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options, const Effects& effects) {
   check_batch(size, options);
-  data_ = std::make_unique<Data>(std::move(model), size, options);
+  check(effects, *model);
+  data_ = std::make_unique<Data>(std::move(model), size, options, effects);
 }
 
 template <class Real>

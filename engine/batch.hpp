@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "engine/block_stepper.hpp"
+#include "layout/effects.hpp"
 
 namespace linden {
 
@@ -76,8 +77,8 @@ class BatchOf {
  public:
   /// Every instance at rest in the model's zero configuration. Throws InputError for options that make no sense or that a batch does not
   /// have: it solves by Newton's method, starts from extrapolation and stops by energy.
-  BatchOf(Model model, std::int64_t size, const BatchOptions& options = {});
-  BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options = {});
+  BatchOf(Model model, std::int64_t size, const BatchOptions& options = {}, const Effects& effects = {});
+  BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options = {}, const Effects& effects = {});
   ~BatchOf();
   BatchOf(BatchOf&&) noexcept;
   BatchOf& operator=(BatchOf&&) noexcept;

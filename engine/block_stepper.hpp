@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "engine/effect_plan.hpp"
 #include "engine/options.hpp"
 #include "engine/step_report.hpp"
 #include "layout/model.hpp"
@@ -53,6 +54,7 @@ struct Block {
   Real* pace;                 // [2]  see State
   const Real* applied;        // [nv] forces given from outside; null: none
   const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
+  Real* contacts;             // [points] how each contact point ended the last step (EffectSweeps::contact); null: none
   InstanceRecord* instances;  // [W]
   int count;                  // instances in use, 1 to W
 };
@@ -77,6 +79,7 @@ struct BlockSetup {
   const BodyConstants<Real>& constants;
   const Options& options;
   bool own_masses;  // Block::mass is given
+  const EffectPlan* plan;  // beside gravity; null: none
 };
 
 template <Instructions>

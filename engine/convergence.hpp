@@ -19,6 +19,12 @@ inline constexpr double kBareRounding = 0.7;
 inline constexpr double kFloorCeiling = 1e-6;
 inline constexpr double kSingleFloorCeiling = 1e-3;  // in single precision
 
+/// Relative residual from which on impulses that hold a joint or a contact are those of the solution, but for this much.
+inline constexpr double kSettled = 1e-4, kSettledSquared = kSettled * kSettled;
+
+/// Share of its kinetic energy that a scene with effects may have back a step after an impact took it.
+inline constexpr double kImpactMemory = 0.9;
+
 /// A step may gain this share of the kinetic energy beyond the work of the forces: what second order leaves where a motion is barely
 /// resolved. On ten-link chains whipping at 4 to 6 ms steps gain 0.02 to 0.12 at most; second roots, met from 8 ms on, 0.77 and more.
 inline constexpr double kMostGain = 0.25;

@@ -59,6 +59,10 @@ std::vector<GroundPoint> points_of(const Contacts& contacts) {
 
 }  // namespace
 
+double share_at(const BodyWrench& wrench, double time) {
+  return time >= wrench.from && time < wrench.to ? wrench.scale.at(time) : 0;
+}
+
 EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
   const double h = options.step;
   const Tree& tree = model.tree;

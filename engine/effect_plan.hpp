@@ -23,6 +23,9 @@ struct TouchedBody {
   Entries drag, wrenches, points;
 };
 
+/// What of a wrench acts at a time.
+double share_at(const BodyWrench& wrench, double time);
+
 struct EffectPlan {
   /// Throws InputError for effects that make no sense for the model.
   EffectPlan(const Model& model, const Options& options, const Effects& effects);

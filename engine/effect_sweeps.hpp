@@ -66,17 +66,31 @@ struct EffectWork {
   S taken() const { return damping + friction + limits + drag + ground; }
 };
 
+/// f of each number of a Scalar.
+template <class S, class Function>
+LINDEN_INLINE S in_each_lane(const S& x, const Function& f) {
+  if constexpr (std::is_arithmetic_v<S>) {
+    return static_cast<S>(f(static_cast<double>(x)));
+  } else {
+    using Real = typename ElementOf<S>::type;
+    std::array<Real, sizeof(S) / sizeof(Real)> each;
+    x.store_unaligned(each.data());
+    for (Real& number : each) number = static_cast<Real>(f(static_cast<double>(number)));
+    return S::load_unaligned(each.data());
+  }
+}
+
 template <class S>
 class EffectSweeps {
  public:
   EffectSweeps(const EffectPlan& plan, const Model& model) : plan_(plan), tree_(model.tree) {
     const Effects& effects = plan.effects;
     const auto rows = [](Field<S>& field, std::size_t count) { field.allocate(static_cast<Index>(count)); };
+    if (plan.joints || !std::is_arithmetic_v<S>) sum_.allocate(tree_.shape);  // factors of blocks add both
     if (plan.joints) {
-      sum_.allocate(tree_.shape);
       last_.allocate(tree_.shape.velocities);
       even_.allocate(tree_.shape.velocities);
-      force_.resize(effects.torques.size());
+      rows(force_, effects.torques.size());
       servos_.entries = effects.servos;
       servos_.share = plan.servo_share;
       rows(servos_.mode, effects.servos.size());
@@ -87,6 +101,10 @@ class EffectSweeps {
       limits_.entries = effects.limits;
       for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
     }
+    if (plan.rotor.rows() > 0) {
+      rotors_.allocate(plan.rotor.rows());
+      for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
+    }
     if (plan.bodies) {
       bodies_.allocate(tree_.shape);
       clear_bodies();
@@ -96,8 +114,7 @@ class EffectSweeps {
       drags_.wind = {effects.wind[0], effects.wind[1], effects.wind[2]};
       rows(drags_.loss, effects.drag.size());
       wrenches_.entries = effects.wrenches;
-      scale_.resize(effects.wrenches.size());
-      wrenches_.scale = scale_;
+      rows(wrenches_.scale, effects.wrenches.size());
       rows(wrenches_.work, effects.wrenches.size());
     }
   }
@@ -108,6 +125,9 @@ class EffectSweeps {
   /// What joints are given, and bodies, for the factors.
   const JointImpulses<S>& joint_sum() const { return sum_; }
   const BodyImpulses<S>& body_sum() const { return bodies_; }
+  /// Armature of every row; no rows without.
+  const Field<S>& rotors() const { return rotors_; }
+  Index contacts() const { return points_.slides.rows(); }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
   Field<S>& servo_targets() { return servos_.target; }
@@ -127,34 +147,34 @@ class EffectSweeps {
 
   /// delta: the first guess, moved into the limits. past(row, k): displacement k steps before, where two are `known`.
   template <class Past, class Mask>
-  void begin(double time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
+  void begin(const S& time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
     h_ = h;
     q_ = &q;
     creep_ = 0;
     ground_before_ = ground_potential_;
-    if (plan_.bodies) {
-      for (std::size_t k = 0; k < scale_.size(); ++k) {
-        const BodyWrench& wrench = plan_.effects.wrenches[k];
-        scale_[k] = time >= wrench.from && time < wrench.to ? wrench.scale.at(time) : 0;
-      }
+    for (Index k = 0; k < wrenches_.scale.rows(); ++k) {
+      const BodyWrench& wrench = plan_.effects.wrenches[static_cast<std::size_t>(k)];
+      wrenches_.scale(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return share_at(wrench, t); });
     }
     if (!plan_.joints) return;
-    for (std::size_t k = 0; k < force_.size(); ++k) force_[k] = plan_.effects.torques[k].force.at(time);
+    for (Index k = 0; k < force_.rows(); ++k) {
+      const JointTorque& torque = plan_.effects.torques[static_cast<std::size_t>(k)];
+      force_(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return torque.force.at(t); });
+    }
     std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
     begin_friction(frictions_, past, known, delta);
     begin_limits(limits_, plan_.q_row, h, q, past, known, delta);
     assemble();
   }
 
-  /// Forces on bodies in slots [begin, end): impulse holds h mu.
+  /// Forces on bodies: impulse holds h mu.
   template <class Element>
-  void bodies(Slots slots, const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
-    auto body = std::ranges::lower_bound(plan_.touched, slots.begin, {}, &TouchedBody::slot);
-    for (; body != plan_.touched.end() && body->slot < slots.end; ++body) {
-      clear_body(bodies_, body->slot);
-      drag_map(drags_, body->drag.first, body->drag.last, constants, h_, displacement, bodies_, impulse);
-      wrench_map(wrenches_, body->wrenches.first, body->wrenches.last, h_, displacement, bodies_, impulse);
-      ground_map(plan_.ground, body->points.first, body->points.last, h_, creep_, displacement, points_, bodies_, impulse);
+  void bodies(const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    for (const TouchedBody& body : plan_.touched) {
+      clear_body(bodies_, body.slot);
+      drag_map(drags_, body.drag.first, body.drag.last, constants, h_, displacement, bodies_, impulse);
+      wrench_map(wrenches_, body.wrenches.first, body.wrenches.last, h_, displacement, bodies_, impulse);
+      ground_map(plan_.ground, body.points.first, body.points.last, h_, creep_, displacement, points_, bodies_, impulse);
     }
   }
   /// Before the first of them: which points slide, as the first guess and the last step have it. `known`: that was one of these sweeps.
@@ -198,6 +218,13 @@ class EffectSweeps {
                       bodies_.last.flat(), bodies_.even.flat(), last_.flat(), even_.flat()};
   }
 
+  /// The same of contact points alone, one number each: 0 apart, 1 sticks, 2 slides.
+  S contact(Index k) const { return points_.closed(k) * (S(1.0) + points_.slides(k)); }
+  void set_contact(Index k, const S& contact) {
+    points_.closed(k) = select(contact > S(0.5), S(1.0), S(0.0));
+    points_.slides(k) = select(contact > S(1.5), S(1.0), S(0.0));
+  }
+
   /// Friction that is smooth up to this speed, until harden. joints() then goes by delta alone.
   void soften(double creep) { creep_ = creep; }
   /// Friction as it is again, from the states that the smooth one has led to.
@@ -239,10 +266,10 @@ class EffectSweeps {
     const S half(0.5);
     joint_impulses_end_map(sum_, h_, delta, end);
     if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
-    const S most = as<S>(std::numeric_limits<double>::max()), zero(0.0);
+    const S most = as<S>(std::numeric_limits<typename ElementOf<S>::type>::max()), zero(0.0);
     for (Index row = 0; row < end.rows(); ++row) {
       S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
-      if (plan_.rotor.rows() > 0) uneven = uneven + as<S>(plan_.rotor(row)) * delta(row);
+      if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
       const auto held = sum_.stiffness(row) > most;
       // the step that comes to rest is an impact
       uneven = select(held, select(delta(row) == zero, uneven + half * residual(row), zero), uneven);
@@ -324,11 +351,12 @@ class EffectSweeps {
   bool known_ = false;   // the last step was one of these sweeps
   Field<S> last_, even_;  // of joints, as BodyImpulses has them of bodies
   const Field<S>* q_ = nullptr;
+  Field<S> rotors_;
   JointImpulses<S> sum_;
   Servos<S> servos_;
   Frictions<S> frictions_;
   Limits<S> limits_;
-  std::vector<double> force_, scale_;
+  Field<S> force_;  // of each given torque
   BodyImpulses<S> bodies_;
   GroundPoints<S> points_;
   Drags<S> drags_;

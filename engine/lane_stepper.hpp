@@ -26,6 +26,7 @@
 
 #include "engine/block_stepper.hpp"
 #include "engine/convergence.hpp"
+#include "engine/effect_sweeps.hpp"
 #include "engine/instance_stepper.hpp"
 #include "kernels/advance_down.hpp"
 #include "kernels/articulated_inertia_up.hpp"
@@ -38,6 +39,9 @@
 namespace linden {
 
 inline constexpr int kMostCorrections = 8;
+
+/// With effects, whose states may take some corrections to settle; from some on they are revised one by one.
+inline constexpr int kMostEffectCorrections = 16, kBulkEffectCorrections = 8;
 
 /// One bit a lane.
 using Lanes = std::uint32_t;
@@ -83,7 +87,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   static constexpr int W = L::count;
 
   explicit LaneStepper(const BlockSetup<Real>& setup)
-      : model_(setup.model), tree_(setup.model.tree), options_(setup.options), shared_constants_(setup.constants), alone_(model_, options_) {
+      : model_(setup.model), tree_(setup.model.tree), options_(setup.options), shared_constants_(setup.constants), alone_(model_, options_, setup.plan) {
+    if (setup.plan != nullptr && setup.plan->any()) effects_ = std::make_unique<EffectSweeps<Pack>>(*setup.plan, model_);
+    if (effects_) end_.allocate(tree_.shape.velocities);
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     kept_.allocate(shape);
@@ -123,10 +129,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   void step(const Block<Real>& block, std::int64_t steps) override {
     load(block);
     refresh();
+    if (effects_) load_contacts(block);
     Lanes alive = 0;
     for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
-    for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = step_once(block, alive);
+    for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = effects_ ? step_with_effects(block, alive) : step_once(block, alive);
     store(block);
+    if (effects_) store_contacts(block);
   }
 
   void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
@@ -191,7 +199,19 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   /// that it does not matter how many steps are taken in one go.
   Pack refresh() {
     advance(L::mask(0));
-    return update_momentum(L::mask(0));
+    const Pack potential = update_momentum(L::mask(0));
+    return effects_ ? potential + refresh_effects() : potential;
+  }
+
+  Pack refresh_effects() { return effect_potential_ = effects_->refresh(work_.placement, q_); }
+
+  void load_contacts(const Block<Real>& block) {
+    if (block.contacts == nullptr) return;
+    for (Index k = 0; k < effects_->contacts(); ++k) effects_->set_contact(k, L::load(block.contacts + k * W));
+  }
+  void store_contacts(const Block<Real>& block) {
+    if (block.contacts == nullptr) return;
+    for (Index k = 0; k < effects_->contacts(); ++k) L::store(effects_->contact(k), block.contacts + k * W);
   }
 
   void advance(const Mask& moves) {
@@ -209,7 +229,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   [[gnu::noinline]] void solve_mass(const Field<Pack>& right_side, Field<Pack>& rate) {
-    articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains());
+    if (effects_ && effects_->rotors().rows() > 0) {
+      const EffectsAdded<Pack, true, false> rotors{effects_->rotors(), effects_->body_sum().pull};
+      articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains(), rotors);
+    } else {
+      articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains());
+    }
     impulse_pass_up(tree_, constants(), work_.placement, gains(), right_side, work_.bias, work_.innovation);
     rate_down(tree_, constants(), work_.placement, gains(), work_.innovation, work_.variation, rate);
   }
@@ -306,6 +331,91 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     return finish(block, alive, done, lost, energy);
   }
 
+  /// What effects do to an evaluation, and its factor and norm.
+  Pack act(Evaluation<Pack>& now) {
+    const EffectPlan& plan = effects_->plan();
+    if (plan.bodies) effects_->bodies(constants(), work_.displacement, work_.impulse);
+    if (plan.joints) {
+      if (plan.balls) displacement_map(tree_, work_.motion, work_.delta);
+      effects_->joints(work_.delta, work_.motion, work_.momentum_target);
+      now.energy = now.energy + armature_energy<Pack>(plan.effects.armature, work_.delta);
+    }
+    const auto& stiffness = effects_->joint_sum().stiffness;
+    const auto& pull = effects_->body_sum().pull;
+    if (plan.bodies) return newton_up<false>(tree_, constants(), work_, EffectsAdded<Pack, true, true>{stiffness, pull});
+    return newton_up<false>(tree_, constants(), work_, EffectsAdded<Pack, true, false>{stiffness, pull});
+  }
+
+  /// As step_once. The factor is exact and fresh at every evaluation, so that lanes that wait for others compute what they had, and what
+  /// becomes of a lane whose effects change their state depends on itself alone.
+  [[gnu::noinline]] Lanes step_with_effects(const Block<Real>& block, Lanes alive) {
+    const Pack h = number(options_.step);
+    momentum_target_map(tree_, h, p_, work_.force, work_.momentum_target);
+    Lanes active = model_.mimics.empty() ? alive : 0, done = 0, lost = alive & ~active;
+    Pack energy = number(0);
+    if (active != 0) {
+      first_guess(block, active);
+      if (effects_->plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects_->plain_target().flat().begin());
+      begin_effects(block);
+      Evaluation<Pack> now = start_down(tree_, constants(), work_);
+      if (effects_->contacts() > 0) effects_->guess_points(work_.displacement, true);
+      Pack norm = act(now);
+      const Pack limit = number(std::numeric_limits<Real>::max());
+      const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
+      for (int corrections = 0;; ++corrections) {
+        const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
+        const Pack scale = now.energy + fall;
+        Lanes ok = usable & L::bits(number(0.5) * norm <= tolerance_squared_ * scale);
+        ok |= usable & ~ok & at_rounding_floor(norm, now.energy);
+        const Lanes settled = ok | (usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale));
+        Lanes changed = 0;
+        if (effects_->plan().revises) {
+          const Mask one_by_one = corrections >= kBulkEffectCorrections ? L::mask(~Lanes{0}) : L::mask(0);
+          changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
+        }
+        ok &= active & ~changed;
+        const Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
+        energy = select(L::mask(ok), now.energy, energy);
+        for (int l = 0; l < block.count; ++l) {
+          if (((ok | given_up) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
+        }
+        done |= ok;
+        lost |= given_up;
+        active &= ~(ok | given_up);
+        if (active == 0) break;
+        now = correct_down(tree_, constants(), L::mask(active & ~changed), work_);
+        norm = act(now);
+      }
+    }
+    return finish(block, alive, done, lost, energy);
+  }
+
+  void begin_effects(const Block<Real>& block) {
+    std::array<Real, W> time{};
+    Lanes known = 0;
+    for (int l = 0; l < block.count; ++l) {
+      time[static_cast<std::size_t>(l)] = static_cast<Real>((static_cast<double>(block.instances[l].steps) + 0.5) * options_.step);
+      known |= block.instances[l].displacements > 1 ? 1u << l : 0u;
+    }
+    constexpr int words = kHistoryWords<Real> * W;
+    const auto past = [&](Index row, int steps) {
+      const std::uint32_t* const from = block.past + row * words;
+      std::array<Real, W> each;
+      for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<W, Real>(from + l, steps);
+      return L::load(each.data());
+    };
+    effects_->begin(L::load(time.data()), number(options_.step), q_, past, L::mask(known), work_.delta);
+  }
+
+  /// What effects add to the end of a step, and how much they did in it.
+  Pack end_effects() {
+    const EffectWork<Pack> done = effects_->work(work_.innovation, work_.delta, work_.delta, false);
+    using std::abs;
+    Pack activity = effects_->activity(done, work_.motion, work_.delta) + effect_potential_;
+    for (Index row = 0; row < tree_.shape.velocities; ++row) activity = activity + abs(work_.force(row) * work_.delta(row));
+    return activity;
+  }
+
   Lanes finish(const Block<Real>& block, Lanes alive, Lanes done, Lanes lost, const Pack& energy) {
     const double rate = 1 / options_.step;
     displacement_map(tree_, work_.motion, work_.delta);
@@ -313,7 +423,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     const Pack pace = L::load(block.pace), pace_work = L::load(block.pace + W);
     const Pack work_at_begin = work();
     using std::max;
-    const Lanes gains = L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) > number(kMostGain) * max(kinetic, pace));
+    const Pack activity = effects_ ? end_effects() : number(0);
+    const Lanes gains =
+        L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) - activity > number(kMostGain) * max(kinetic, pace));
     lost |= done & gains;
     done &= ~lost;
 
@@ -323,11 +435,23 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
 
     const Mask moves = L::mask(done);
+    if (effects_) {
+      if (effects_->plan().joints) effects_->end_joints(work_.delta, work_.motion, work_.innovation, end_);
+      if (effects_->plan().bodies) effects_->end_bodies(work_.placement, work_.displacement, work_.impulse);
+      for (Index k = 0; k < effects_->contacts(); ++k) effects_->set_contact(k, select(moves, effects_->contact(k), number(0)));
+    }
     advance(moves);
     update_momentum(moves);
+    if (effects_) {
+      if (effects_->plan().joints) {
+        for (Index row = 0; row < tree_.shape.velocities; ++row) p_(row) = select(moves, p_(row) + end_(row), p_(row));
+      }
+      refresh_effects();
+    }
     if (done == 0) return alive & ~frozen;
 
-    L::store(select(moves, kinetic, L::load(block.pace)), block.pace);
+    const Pack kept = effects_ ? max(kinetic, select(pace > number(0), number(kImpactMemory) * pace, number(0))) : kinetic;
+    L::store(select(moves, kept, L::load(block.pace)), block.pace);
     L::store(select(moves, number(0.5) * (work_at_begin + work()), L::load(block.pace + W)), block.pace + W);
     std::array<std::int32_t, W> known;
     for (int l = 0; l < W; ++l) {
@@ -421,6 +545,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Workspace<Pack> work_;
   Kept<Pack> kept_;
   Field<Pack> q_, p_, applied_;
+  std::unique_ptr<EffectSweeps<Pack>> effects_;  // null: none
+  Field<Pack> end_;                              // what effects add to p at the end of a step
+  Pack effect_potential_ = Pack(Real(0));
   InstanceStepper alone_;
 };
 

@@ -48,12 +48,6 @@ constexpr int kMostSoftCorrections = 30;
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
 constexpr double kSteepest = 0.5;
 
-/// Relative residual from which on impulses that hold a joint or a contact are those of the solution, but for this much.
-constexpr double kSettled = 1e-4;
-
-/// Share of its kinetic energy that a scene with effects may have back a step after an impact took it.
-constexpr double kImpactMemory = 0.9;
-
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -186,7 +180,7 @@ void Stepper::act(Evaluated& now) {
   if (plan.bodies) {
     if (guess_points_) effects_->guess_points(work_.displacement, known_);
     guess_points_ = false;
-    effects_->bodies(all_slots(model_.tree), *constants_, work_.displacement, work_.impulse);
+    effects_->bodies(*constants_, work_.displacement, work_.impulse);
   }
   if (plan.joints) {
     if (plan.balls) displacement_map(model_.tree, work_.motion, work_.delta);
@@ -210,8 +204,8 @@ void Stepper::with_added(const Action& action) {
 }
 
 void Stepper::factor_mass() {
-  if (effects_ && effects_->plan().rotor.rows() > 0) {
-    const EffectsAdded<double, true, false> rotors{effects_->plan().rotor, effects_->body_sum().pull};
+  if (effects_ && effects_->rotors().rows() > 0) {
+    const EffectsAdded<double, true, false> rotors{effects_->rotors(), effects_->body_sum().pull};
     articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), rotors);
   } else {
     articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains());

@@ -83,12 +83,17 @@ struct GroundPlan {
 };
 
 template <class S>
+LINDEN_INLINE Vec3<S> spread3(const Vec3<double>& a) {
+  return {as<S>(a.x), as<S>(a.y), as<S>(a.z)};
+}
+
+template <class S>
 struct GroundBelow {
   S height;         // over the plane, along its normal [m]
   Vec3<S> normal;   // in the plane's frame
 };
 
-inline GroundBelow<double> ground_below(const HeightField& field, double x, double y) {
+LINDEN_INLINE GroundBelow<double> ground_below(const HeightField& field, double x, double y) {
   const double u = std::clamp((x - field.origin_x) / field.spacing_x, 0.0, field.columns - 1.0);
   const double v = std::clamp((y - field.origin_y) / field.spacing_y, 0.0, field.rows - 1.0);
   const Index column = std::min(static_cast<Index>(u), field.columns - 2), row = std::min(static_cast<Index>(v), field.rows - 2);
@@ -106,23 +111,23 @@ inline GroundBelow<double> ground_below(const HeightField& field, double x, doub
 template <class S>
 GroundBelow<S> ground_below(const HeightField& field, const S& x, const S& y) {
   using Real = typename ElementOf<S>::type;
-  constexpr std::size_t W = sizeof(S) / sizeof(Real);
-  std::array<Real, W> xs, ys, h, nx, ny, nz;
-  x.store_unaligned(xs.data());
-  y.store_unaligned(ys.data());
-  for (std::size_t l = 0; l < W; ++l) {
-    const GroundBelow<double> below = ground_below(field, static_cast<double>(xs[l]), static_cast<double>(ys[l]));
-    h[l] = static_cast<Real>(below.height);
-    nx[l] = static_cast<Real>(below.normal.x);
-    ny[l] = static_cast<Real>(below.normal.y);
-    nz[l] = static_cast<Real>(below.normal.z);
+  if constexpr (std::is_arithmetic_v<S>) {
+    const GroundBelow<double> below = ground_below(field, static_cast<double>(x), static_cast<double>(y));
+    return {as<S>(below.height), spread3<S>(below.normal)};
+  } else {
+    constexpr std::size_t W = sizeof(S) / sizeof(Real);
+    std::array<Real, W> xs, ys, h, nx, ny, nz;
+    x.store_unaligned(xs.data());
+    y.store_unaligned(ys.data());
+    for (std::size_t l = 0; l < W; ++l) {
+      const GroundBelow<double> below = ground_below(field, static_cast<double>(xs[l]), static_cast<double>(ys[l]));
+      h[l] = static_cast<Real>(below.height);
+      nx[l] = static_cast<Real>(below.normal.x);
+      ny[l] = static_cast<Real>(below.normal.y);
+      nz[l] = static_cast<Real>(below.normal.z);
+    }
+    return {S::load_unaligned(h.data()), {S::load_unaligned(nx.data()), S::load_unaligned(ny.data()), S::load_unaligned(nz.data())}};
   }
-  return {S::load_unaligned(h.data()), {S::load_unaligned(nx.data()), S::load_unaligned(ny.data()), S::load_unaligned(nz.data())}};
-}
-
-template <class S>
-LINDEN_INLINE Vec3<S> spread3(const Vec3<double>& a) {
-  return {as<S>(a.x), as<S>(a.y), as<S>(a.z)};
 }
 
 /// Where the points are over the ground at the beginning of a step; potential energy of those inside [J].
@@ -143,7 +148,7 @@ S find_ground(const GroundPlan& plan, const Field<S, 12>& pose, GroundPoints<S>&
       const Vec3<S> axis = spread3<S>({point.axis[0], point.axis[1], point.axis[2]}), up = transpose_times(T.R, ez);
       // upright on the plane any direction is the lowest
       const Vec3<S> helper = point.axis[0] * point.axis[0] < 0.5 ? Vec3<S>{one, zero, zero} : Vec3<S>{zero, one, zero};
-      const Vec3<S> across = up - dot(up, axis) * axis + S(1e-9) * (helper - dot(helper, axis) * axis);
+      const Vec3<S> across = up - dot(up, axis) * axis + as<S>(1e-9) * (helper - dot(helper, axis) * axis);
       const Vec3<S> high = (one / sqrt(dot(across, across))) * across;
       const Vec3<S> side = point.quarter % 2 == 0 ? high : cross(axis, high);
       c = c + as<S>(point.quarter < 2 ? -point.rim_radius : point.rim_radius) * side;
@@ -194,16 +199,25 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
   const Ground& ground = plan.ground;
   const S stiff = as<S>(ground.stiffness), damp = rate * as<S>(ground.damping), mu = as<S>(ground.friction);
   const S stick = mu / (h * as<S>(kCreep));
+  const Vec3<S> none{zero, zero, zero};
   for (std::size_t at = first; at < last; ++at) {
     const Index k = static_cast<Index>(at), i = plan.points[at].slot;
     const auto c = load<Vec3, S>(points.center, k), n = load<Vec3, S>(points.normal, k);
-    const Vec3<S> a = c - as<S>(plan.points[at].radius) * n;
     const auto D = load<Displacement, S>(displacement, i);
-    const S share = as<S>(plan.share[at]);
-    const Vec3<S> moved = point_displacement(D, a);
     const Vec3<S> center_moved = point_displacement(D, c);
     const S rise = dot(n, center_moved);
     const S gap = points.gap(k), next = gap + rise;
+    store(points.slip_before, k, load<Vec3, S>(points.slip, k));
+    points.rise(k) = rise;
+    if (!any(gap < zero || next < zero)) {
+      // most points of a robot are far from the ground, in all lanes
+      points.closed(k) = points.load(k) = points.push(k) = zero;
+      store(points.drag, k, none);
+      continue;
+    }
+    const Vec3<S> a = c - as<S>(plan.points[at].radius) * n;
+    const Vec3<S> moved = point_displacement(D, a);
+    const S share = as<S>(plan.share[at]);
     const S m = min(gap, zero), m_next = min(next, zero);
     // where both ends are inside the quotient is that of a parabola; elsewhere rise is not zero
     const auto inside = gap < zero && next < zero;
@@ -222,7 +236,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const auto slides = points.slides(k) > zero;
     const S per_length = creep > 0 ? one / max(length, h * as<S>(creep)) : select(length > zero, one / length, zero);
     const Vec3<S> direction = per_length * t;
-    const auto by_load = slides || S(creep) > zero;
+    const auto by_load = slides || as<S>(creep) > zero;
     const S b = select(closed, select(by_load, mu * N * per_length, stick * max(-stiff * gap, as<S>(plan.least_load))), zero);
     const Vec3<S> drag = -b * t, push = N * n;
 
@@ -235,13 +249,11 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const Mat3<S> across = diagonal(one) - outer(n, n) - select(slides, one, zero) * outer(direction, direction);
     add_pull(sum, i, a, a, R, (scale * b) * across);
 
-    store(points.slip_before, k, load<Vec3, S>(points.slip, k));
     store(points.slip, k, t);
     points.closed(k) = select(closed, one, zero);
     points.load(k) = select(closed && !by_load, b * length / (mu * N), zero);
     points.push(k) = N;
     store(points.drag, k, drag);
-    points.rise(k) = rise;
   }
 }
 

@@ -42,7 +42,7 @@ struct JointImpulses {
 };
 
 /// s for an effect whose impulse over a step is `ratio` times what stops the joint.
-inline double begin_share(double ratio) { return std::max(0.5, 1 - 0.5 / ratio); }
+LINDEN_INLINE double begin_share(double ratio) { return std::max(0.5, 1 - 0.5 / ratio); }
 
 template <class S>
 void clear(JointImpulses<S>& sum) {

@@ -17,15 +17,17 @@ namespace linden {
 
 /// force: one number an entry, of the middle of the step.
 template <class S>
-void torque_map(std::span<const JointTorque> torques, std::span<const double> force, const S& h, JointImpulses<S>& sum) {
-  for (std::size_t k = 0; k < torques.size(); ++k) add_impulse(sum, torques[k].row, 0.5, -(h * h * as<S>(force[k])), S(0.0));
+void torque_map(std::span<const JointTorque> torques, const Field<S>& force, const S& h, JointImpulses<S>& sum) {
+  for (Index k = 0; k < force.rows(); ++k) {
+    add_impulse(sum, torques[static_cast<std::size_t>(k)].row, 0.5, -(h * h * force(k)), S(0.0));
+  }
 }
 
 /// Work in a step [J].
 template <class S>
-S torque_work(std::span<const JointTorque> torques, std::span<const double> force, const Field<S>& delta) {
+S torque_work(std::span<const JointTorque> torques, const Field<S>& force, const Field<S>& delta) {
   S sum(0.0);
-  for (std::size_t k = 0; k < torques.size(); ++k) sum = sum + as<S>(force[k]) * delta(torques[k].row);
+  for (Index k = 0; k < force.rows(); ++k) sum = sum + force(k) * delta(torques[static_cast<std::size_t>(k)].row);
   return sum;
 }
 

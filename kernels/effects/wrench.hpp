@@ -21,8 +21,8 @@ namespace linden {
 template <class S>
 struct Wrenches {
   std::span<const BodyWrench> entries;
-  std::span<const double> scale;  // of each in this step; zero outside its time
-  Field<S> work;                  // of each in the evaluation last made [J]
+  Field<S> scale;  // of each in this step; zero outside its time
+  Field<S> work;   // of each in the evaluation last made [J]
 };
 
 /// Entries first ... last - 1, sorted by slot.
@@ -30,16 +30,17 @@ template <class S>
 void wrench_map(Wrenches<S>& wrenches, std::size_t first, std::size_t last, const S& h, const Field<S, 7>& displacement,
                 BodyImpulses<S>& sum, Field<S, 6>& impulse) {
   const S half(0.5), scale = h * h;
-  const auto vector = [](const std::array<double, 3>& from, double times) {
-    return Vec3<S>{as<S>(times * from[0]), as<S>(times * from[1]), as<S>(times * from[2])};
+  const auto vector = [](const std::array<double, 3>& from) LINDEN_INLINE_LAMBDA {
+    return Vec3<S>{as<S>(from[0]), as<S>(from[1]), as<S>(from[2])};
   };
   for (std::size_t k = first; k < last; ++k) {
     const BodyWrench& wrench = wrenches.entries[k];
     const Index i = wrench.slot;
-    const Vec3<S> a = vector(wrench.point, 1);
+    const Vec3<S> a = vector(wrench.point);
     const auto D = load<Displacement, S>(displacement, i);
     const Vec3<S> moved = point_displacement(D, a), turn = log(D).w;
-    Vec3<S> force = vector(wrench.force, wrenches.scale[k]), moment = vector(wrench.moment, wrenches.scale[k]);
+    const S& share = wrenches.scale(static_cast<Index>(k));
+    Vec3<S> force = share * vector(wrench.force), moment = share * vector(wrench.moment);
     Vec3<S> end_force = force, end_moment = moment;  // in the body frame at k as well
     if (wrench.in_world) {
       const auto R = load<Placement, S>(sum.pose, i).R;

@@ -3,6 +3,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/batch.hpp"
+#include "engine/drift.hpp"
+#include "engine/scene_file.hpp"
+#include "folder.hpp"
 #include "models/generators.hpp"
 #include "scenes.hpp"
 
@@ -380,6 +384,114 @@ TEST_CASE("nothing stiff blows up or gains energy, with steps far beyond its tim
       if (!ball) CHECK(std::abs(simulation.positions()[0]) < 1e-2);
     }
   }
+}
+
+TEST_CASE("a batch with effects moves as simulations of its own, to the bit whatever the neighbours and the threads", "[effects][batch]") {
+  const Scene scene = load_scene(model_file("scenes/humanoid_drop.yaml"));
+  const auto model = std::make_shared<const Model>(scene.model);
+  const auto start = [&](std::int64_t i) {
+    std::vector<double> q = scene.initial.positions;
+    q[2] += 0.013 * static_cast<double>(i);
+    return q;
+  };
+  const std::vector<double> rest(static_cast<std::size_t>(model->tree.shape.velocities), 0.0);
+  constexpr std::int64_t kSize = 11;
+  constexpr int kSteps = 350;
+  const auto rolled = [&](int threads, std::int64_t first, std::int64_t size, std::vector<std::int64_t> parts) {
+    BatchOptions options;
+    static_cast<Options&>(options) = scene.options;
+    options.threads = threads;
+    Batch batch(model, size, options, scene.effects);
+    for (std::int64_t i = 0; i < size; ++i) batch.reset(i, start(first + i), rest);
+    for (const std::int64_t steps : parts) batch.step(steps);
+    CHECK(batch.summary().frozen == 0);
+    std::vector<std::vector<double>> ends;
+    for (std::int64_t i = 0; i < size; ++i) {
+      const auto q = batch.positions().instance(i);
+      ends.emplace_back(q.begin(), q.end());
+    }
+    return ends;
+  };
+  const auto all = rolled(2, 0, kSize, {kSteps});
+  for (std::int64_t i = 0; i < kSize; i += 5) {
+    Simulation simulation(model, scene.options, scene.effects);
+    simulation.set_positions(start(i));
+    run(simulation, kSteps);
+    CHECK(distance(simulation.positions(), all[static_cast<std::size_t>(i)]) < 1e-6);
+  }
+  const auto others = rolled(1, 3, 5, {100, 1, kSteps - 101});
+  for (std::size_t i = 0; i < others.size(); ++i) CHECK(others[i] == all[i + 3]);
+}
+
+TEST_CASE("the dropped humanoid comes to rest within its limits and stays there without creeping", "[effects]") {
+  const Scene scene = load_scene(model_file("scenes/humanoid_drop.yaml"));
+  Simulation simulation(scene);
+  const auto& attributes = simulation.model().attributes;
+  const Tree& tree = simulation.model().tree;
+  double beyond = 0;
+  std::int64_t iterations = 0;
+  const auto simulate = [&](int steps) {
+    for (int k = 0; k < steps; ++k) {
+      const StepReport report = simulation.step();
+      if (!report.ok()) FAIL(simulation.describe(report));
+      iterations += report.iterations;
+      for (Index i = 2; i < tree.shape.slots; ++i) {
+        const double q = simulation.positions()[static_cast<std::size_t>(tree.first_q(i))];
+        beyond = std::max({beyond, q - attributes.upper(tree.first_v(i)), attributes.lower(tree.first_v(i)) - q});
+      }
+    }
+  };
+  simulate(12000);
+  const std::vector<double> rested(simulation.positions().begin(), simulation.positions().end());
+  CHECK(rested[2] > 0.88);  // it stands
+  simulate(10000);
+  CHECK(distance(simulation.positions(), rested) < 1e-3 / 6);
+  double fastest = 0;
+  for (const double v : simulation.velocities()) fastest = std::max(fastest, std::abs(v));
+  CHECK(fastest < 1e-3);
+  CHECK(beyond < 1e-9);
+  CHECK(static_cast<double>(iterations) / 22000 < 5);
+}
+
+TEST_CASE("a run of effects that goes on from a checkpoint is the run that went on", "[effects]") {
+  const Folder folder;
+  const Scene scene = load_scene(model_file("scenes/humanoid_drop.yaml"));
+  Simulation one(scene), other(scene);
+  run(one, 400);
+  one.save(folder.file("a.checkpoint"));
+  run(one, 100);
+  other.load(folder.file("a.checkpoint"));
+  run(other, 100);
+  CHECK(std::ranges::equal(one.positions(), other.positions()));
+  CHECK(std::ranges::equal(one.momenta(), other.momenta()));
+  CHECK(one.velocities() == other.velocities());
+}
+
+TEST_CASE("conservative effects leave no slope in the energy over 100,000 steps, damping's account closes to 1e-6", "[effects]") {
+  const Model model = chain(4);
+  Effects effects;
+  for (Index row = 0; row < 4; ++row) effects.springs.push_back({.row = row, .stiffness = 0.3, .rest = 0.1});
+  effects.armature = {{.row = 1, .inertia = 1e-4}};
+  Simulation conserving(model, {}, effects);
+  random_start(conserving, 3, 0.3);
+  EnergyDrift drift(20000);
+  drift.add(0, conserving.energy());
+  for (int k = 0; k < 20000; ++k) {
+    run(conserving, 5);
+    drift.add(conserving.time(), conserving.energy());
+  }
+  INFO("slope " << drift.slope() << " +- " << drift.slope_error() << " J/s, band " << drift.band() << " J");
+  CHECK(drift.band() < 1e-3 * drift.scale());
+  CHECK(std::abs(drift.slope()) < 4 * drift.slope_error());
+
+  effects.springs.clear();
+  for (Index row = 0; row < 4; ++row) effects.damping.push_back({.row = row, .coefficient = 2e-4});
+  Simulation damped(model, {.step = 2e-4}, effects);
+  random_start(damped, 3, 0.3);
+  const double before = damped.energy().total();
+  run(damped, 20000);
+  CHECK(damped.effect_work().damping > 0.01);
+  CHECK(balance(damped) == Approx(before).margin(1e-6 * damped.effect_work().damping * 100));
 }
 
 }  // namespace linden
