@@ -191,11 +191,12 @@ class EffectSweeps {
 
   /// States that belong to the solution so far. `settled`: the residual is small, so that impulses that hold can be judged. delta is
   /// changed where a joint comes to rest. Of what sticks too hard all start to slide, or, where `one_by_one`, that alone which does
-  /// most: slower, and never in a circle. Returns in which instances something changed: the factor is out of date there.
+  /// most: slower, and hardly ever in a circle. Softly only limits have states to revise. Returns in which instances something changed: the factor is out of date there.
   template <class Mask>
   auto revise(const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
     using std::max;
     auto changed = S(0.0) > S(1.0);
+    if (soft()) return revise_limits(limits_, residual, settled, delta);
     S least(0.0);
     if (any(one_by_one)) {
       const S overload = max(friction_overload(frictions_, h_, residual), ground_overload(points_));
@@ -226,7 +227,10 @@ class EffectSweeps {
   }
 
   /// Friction that is smooth up to this speed, until harden. joints() then goes by delta alone.
-  void soften(double creep) { creep_ = creep; }
+  void soften(double creep, Field<S>& delta) {
+    if (soft()) shrink_friction(frictions_, creep / creep_, delta);
+    creep_ = creep;
+  }
   /// Friction as it is again, from the states that the smooth one has led to.
   void harden() {
     creep_ = 0;
@@ -238,11 +242,6 @@ class EffectSweeps {
     revise_servos(servos_, plan_.q_row, h_, *q_, delta);
     guess_friction(frictions_, h_, creep_, delta);
     assemble();
-  }
-  /// While soft: as revise, for limits alone, which are not smooth.
-  template <class Mask>
-  auto revise_hard(const Field<S>& residual, const Mask& settled, Field<S>& delta) {
-    return revise_limits(limits_, residual, settled, delta);
   }
 
   /// Impulses of the beginning become those of the end, but for being seen from the new poses.

@@ -45,4 +45,23 @@ InitialState random_state(const Model& model, std::uint64_t seed, double spread)
   return state;
 }
 
+InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread) {
+  const InitialState random = random_state(model, seed, spread);
+  InitialState state = start;
+  if (state.positions.empty()) state.positions = model.neutral();
+  state.velocities.resize(random.velocities.size(), 0.0);
+  for (const Run& run : model.tree.runs) {
+    if (run.kind != JointKind::screw) continue;
+    for (Index i = run.begin; i < run.end; ++i) {
+      const Index v = model.tree.first_v(i);
+      double& q = state.positions[static_cast<std::size_t>(model.tree.first_q(i))];
+      const double moved = q + random.positions[static_cast<std::size_t>(model.tree.first_q(i))];
+      // a start beyond a limit is the scene's own
+      q = std::clamp(moved, std::min(q, model.attributes.lower(v)), std::max(q, model.attributes.upper(v)));
+    }
+  }
+  for (std::size_t k = 0; k < state.velocities.size(); ++k) state.velocities[k] += random.velocities[k];
+  return state;
+}
+
 }  // namespace linden

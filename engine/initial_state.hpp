@@ -28,4 +28,8 @@ inline constexpr double kDefaultSpread = 0.1;
 
 InitialState random_state(const Model& model, std::uint64_t seed, double spread);
 
+/// A given start with those numbers on top: positions of screws, within their limits, and all velocities; orientations and places of ball
+/// and free joints stay.
+InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread);
+
 }  // namespace linden

@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "engine/effect_cost.hpp"
 #include "engine/effects_text.hpp"
 #include "engine/load_model.hpp"
 #include "engine/mass_distribution.hpp"
@@ -116,9 +117,12 @@ Index widest_level(const Tree& tree) {
   return widest;
 }
 
+Effects effects_of(const InspectArguments& arguments) { return arguments.scene ? arguments.scene->effects : Effects(); }
+
 class Printer {
  public:
-  Printer(const InspectArguments& arguments, const Model& model) : arguments_(arguments), model_(model), bodies_(bodies_of(model)) {}
+  Printer(const InspectArguments& arguments, const Model& model, std::vector<EffectCost> costs)
+      : arguments_(arguments), model_(model), bodies_(bodies_of(model)), costs_(std::move(costs)) {}
 
   void print() const {
     totals();
@@ -171,6 +175,10 @@ class Printer {
     for (const EffectLine& line : effect_lines(scene.effects, model_)) {
       fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
     }
+    if (costs_.empty()) return;
+    fmt::print("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs_.front().nanoseconds,
+               costs_.back().nanoseconds);
+    for (std::size_t k = 1; k + 1 < costs_.size(); ++k) fmt::print("  {:<9} {:+.0f} alone\n", costs_[k].name, costs_[k].nanoseconds);
   }
 
   void table() const {
@@ -248,7 +256,7 @@ class Printer {
     fmt::print("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
     Table table({{"when", Align::left}, {"sweep", Align::left}, {"reads", Align::left}, {"writes", Align::left}}, kLineWidth);
     std::string_view before;
-    for (const Sweep& sweep : sweeps_of(model_, arguments_.options)) {
+    for (const Sweep& sweep : sweeps_of(model_, arguments_.options, effects_of(arguments_))) {
       table.add({std::string(sweep.when == before ? "" : sweep.when), std::string(sweep.name), std::string(sweep.reads),
                  std::string(sweep.writes)});
       before = sweep.when;
@@ -266,9 +274,10 @@ class Printer {
   const InspectArguments& arguments_;
   const Model& model_;
   std::vector<BodyFacts> bodies_;
+  std::vector<EffectCost> costs_;  // of a scene
 };
 
-Json json_of(const InspectArguments& arguments, const Model& model) {
+Json json_of(const InspectArguments& arguments, const Model& model, const std::vector<EffectCost>& costs) {
   const Tree& tree = model.tree;
   const MassDistribution masses = mass_distribution(model, model.neutral());
   const std::vector<BodyFacts> bodies = bodies_of(model);
@@ -326,7 +335,7 @@ Json json_of(const InspectArguments& arguments, const Model& model) {
                       {"offset", mimic.offset}});
   }
   Json& sweeps = result["sweeps"] = Json::array();
-  for (const Sweep& sweep : sweeps_of(model, arguments.options)) {
+  for (const Sweep& sweep : sweeps_of(model, arguments.options, effects_of(arguments))) {
     sweeps.push_back({{"when", sweep.when}, {"name", sweep.name}, {"reads", sweep.reads}, {"writes", sweep.writes}});
   }
   if (arguments.scene) {
@@ -335,6 +344,7 @@ Json json_of(const InspectArguments& arguments, const Model& model) {
     result["duration"] = scene.duration;
     result["gravity"] = arguments.options.gravity;
     result["effects"] = effects_json(scene.effects, model);
+    for (const EffectCost& cost : costs) result["ns_per_body_step"][cost.name] = cost.nanoseconds;
     result["initial"] = {{"positions", scene.initial.positions}, {"velocities", scene.initial.velocities}};
   }
   result["warnings"] = model.warnings;
@@ -349,10 +359,9 @@ int inspect(const InspectArguments& arguments) {
   if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
   const Model loaded = arguments.scene ? Model() : load_model(arguments.model, arguments.base);
   const Model& model = arguments.scene ? arguments.scene->model : loaded;
-  if (!arguments.json.empty()) {
-    write_json(arguments.json, json_of(arguments, model));
-  }
-  Printer(arguments, model).print();
+  const std::vector<EffectCost> costs = arguments.scene ? effect_costs(*arguments.scene) : std::vector<EffectCost>();
+  if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs));
+  Printer(arguments, model, costs).print();
   return 0;
 }
 

@@ -1,7 +1,7 @@
 // engine/inspect.hpp
 // `linden inspect`: what a model or scene is once it is loaded, and what a step of it computes.
 //
-//   effects      of a scene, a line each
+//   effects      of a scene, a line each, and what each costs a step on this machine
 //   bodies       slot, body, parent, joint, rows in q and v, mass, limits; links merged into them; mimic joints
 //   conventions  which row is which, order of quaternions and twists, frames
 //   totals       counts, mass, centre of mass, levels, runs, memory

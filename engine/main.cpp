@@ -98,6 +98,12 @@ void read_run_options(const Texts& texts, RunArguments& run) {
 
 void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
   read_motion_options(texts, rollout, rollout.options);
+  rollout.scene = scene_named(rollout.model, rollout.base, {});
+  if (rollout.scene) {
+    static_cast<Options&>(rollout.options) = rollout.scene->options;
+    rollout.duration = rollout.scene->duration;
+    read_motion_options(texts, rollout, rollout.options);
+  }
   if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
   if (!texts.every.empty()) rollout.every = integer_from("--every", texts.every, "steps between frames, such as 10");
   if (!texts.threads.empty()) {
@@ -191,9 +197,9 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
 }
 
 CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout) {
-  CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model at once.");
+  CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model or scene at once.");
   const Adding add{command};
-  add.model(rollout.model);
+  add.model(rollout.model, kSceneHelp);
   add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
   add.spread("Instances", texts);
@@ -213,6 +219,7 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
       "and keeps its files.\n\n"
       "Examples:\n"
       "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
+      "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"
       "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10");
   return command;
 }

@@ -51,13 +51,16 @@ template <class Real>
 class Execution {
  public:
   Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
-      : arguments_(arguments), batch_(std::move(model), arguments.instances, arguments.options) {
+      : arguments_(arguments),
+        batch_(std::move(model), arguments.instances, arguments.options, arguments.scene ? arguments.scene->effects : Effects()) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
     const Randomness random = *randomness(arguments);
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
-      const InitialState state = random_state(batch_.model(), random.seed + static_cast<std::uint64_t>(i), random.spread);
+      const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
+      const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread)
+                                                 : random_state(batch_.model(), seed, random.spread);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
     });
@@ -192,7 +195,7 @@ int rollout_command(const RolloutArguments& given) {
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   check_arguments(arguments);
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
-  const auto model = std::make_shared<const Model>(load_model(arguments.model, arguments.base));
+  const auto model = std::make_shared<const Model>(arguments.scene ? arguments.scene->model : load_model(arguments.model, arguments.base));
   print_warnings(*model);
   return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
 }

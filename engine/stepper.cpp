@@ -36,13 +36,13 @@ constexpr double kExtrapolation[kHistory][kHistory] = {
 constexpr Index kPart = 64;
 
 /// Revisions of effects' states in one solve: a pile of joints that stick and slide at once takes some ten.
-constexpr int kMostRevisions = 60;
+constexpr int kMostRevisions = 20, kLastRevision = 60;
 
 /// From then on they are made one by one.
 constexpr int kBulkRevisions = 5;
 
 /// Where they do not settle: speeds up to which friction is made smooth, one after the other [m/s, rad/s].
-constexpr double kSoftCreeps[] = {1e-2, 1e-4, 1e-6};
+constexpr double kSoftCreeps[] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 constexpr int kMostSoftCorrections = 30;
 
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
@@ -489,15 +489,14 @@ bool Stepper::gains_energy(const State<double>& state, double h) {
 template <class Start>
 void Stepper::approach_softly(Evaluated& now, double& norm, const Start& start, StepReport& report) {
   for (const double creep : kSoftCreeps) {
-    effects_->soften(creep);
     displacement_map(model_.tree, work_.motion, work_.delta);
+    effects_->soften(creep, work_.delta);
     now = evaluate(report, start);
     norm = factor_and_pass(now, report);
     for (int k = 0; k < kMostSoftCorrections; ++k) {
       if (!now.usable() || !std::isfinite(norm)) return;
       const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
-      if (effects_->revise_hard(left(), settled, work_.delta)) {
-        displacement_map(model_.tree, work_.motion, work_.delta);
+      if (revise_effects(settled, false)) {
         now = evaluate(report, start);
         norm = factor_and_pass(now, report);
         continue;
@@ -577,16 +576,17 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   const bool revises = effects_ && effects_->plan().revises;
   int revisions = 0;
   const auto revised = [&](bool settled) {
-    if (revises && revisions == kBulkRevisions && one_pass_) {
-      revisions += 1;
+    if (revises && one_pass_ && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
+      // at first only to find the states; where they still do not settle the step stays with friction smooth below the least creep
       approach_softly(now, norm, start, report);
-      effects_->harden();
+      if (revisions == kBulkRevisions) effects_->harden();
+      revisions += 1;
       displacement_map(model_.tree, work_.motion, work_.delta);
       now = evaluate(report, start);
       norm = factor_and_pass(now, report);
       return fresh = true;
     }
-    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kMostRevisions || !revise_effects(settled, revisions >= kBulkRevisions)) return false;
+    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision || !revise_effects(settled, revisions >= kBulkRevisions)) return false;
     revisions += 1;
     report.iterations += 1;
     now = evaluate(report, start);
@@ -606,7 +606,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
       at_floor = false;
       continue;
     }
-    if (done && revisions < kMostRevisions) {
+    if (done && revisions < kLastRevision) {
       report.at_rounding_floor |= at_floor;
       return end(StepStatus::converged);
     }

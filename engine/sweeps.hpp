@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/options.hpp"
+#include "layout/effects.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
@@ -17,6 +18,6 @@ struct Sweep {
 };
 
 /// Those of this model and these options: what a scene does not have is not in the list.
-std::vector<Sweep> sweeps_of(const Model& model, const Options& options);
+std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const Effects& effects = {});
 
 }  // namespace linden

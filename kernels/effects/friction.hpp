@@ -63,6 +63,15 @@ void begin_friction(Frictions<S>& frictions, const Past& past, const Mask& known
   }
 }
 
+/// Displacements of joints that hold softly, for a creep that is smaller by a factor: their forces stay.
+template <class S>
+void shrink_friction(const Frictions<S>& frictions, double factor, Field<S>& delta) {
+  for (Index k = 0; k < frictions.mode.rows(); ++k) {
+    S& d = delta(frictions.entries[static_cast<std::size_t>(k)].row);
+    d = select(frictions.mode(k) == S(0.0), as<S>(factor) * d, d);
+  }
+}
+
 template <class S>
 void friction_map(const Frictions<S>& frictions, const S& h, double creep, JointImpulses<S>& sum) {
   const S zero(0.0);

@@ -1,0 +1,66 @@
+#include <catch2/catch.hpp>
+
+#include <set>
+#include <string>
+
+#include "engine/effect_plan.hpp"
+#include "engine/sweeps.hpp"
+#include "models/generators.hpp"
+
+namespace linden {
+namespace {
+
+std::multiset<std::string> names_of(const std::vector<Sweep>& sweeps) {
+  std::multiset<std::string> names;
+  for (const Sweep& sweep : sweeps) names.insert(std::string(sweep.name));
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no others") {
+  const Model model = chain(3);
+  const Options options;
+  const auto plain = names_of(sweeps_of(model, options));
+  const std::vector<std::string> joint{"joint_impulses_map", "joint_impulses_end_map"}, body{"add_given_up", "world_placement_down"};
+  const auto check_added = [&](const Effects& effects, std::vector<std::string> sweeps) {
+    std::multiset<std::string> expected = plain;
+    expected.insert(sweeps.begin(), sweeps.end());
+    CHECK(names_of(sweeps_of(model, options, effects)) == expected);
+    CHECK(EffectPlan(model, options, effects).any());
+  };
+  const auto with = [](std::vector<std::string> some, const std::vector<std::string>& more) {
+    some.insert(some.end(), more.begin(), more.end());
+    return some;
+  };
+  CHECK_FALSE(EffectPlan(model, options, {}).any());
+  Effects armature, spring, damping, friction, limits, servo, limited, torque, drag, wrench, ground, empty_ground;
+  armature.armature = {{.row = 0, .inertia = 1}};
+  spring.springs = {{.row = 0, .stiffness = 1}};
+  damping.damping = {{.row = 0, .coefficient = 1}};
+  friction.friction = {{.row = 0, .force = 1}};
+  limits.limits = {{.row = 0, .lower = 0}};
+  servo.servos = {{.row = 0, .stiffness = 1}};
+  limited.servos = {{.row = 0, .stiffness = 1, .max_force = 1}};
+  torque.torques = {{.row = 0, .force = {}}};
+  drag.drag = {{.slot = 1, .linear = 1}};
+  wrench.wrenches = {{.slot = 1}};
+  ground.ground = Ground{};
+  ground.ground->contacts.spheres = {{.slot = 1, .center = {}, .radius = 0.1}};
+  empty_ground.ground = Ground{};
+  check_added(armature, with({"armature_map"}, joint));
+  check_added(spring, with({"spring_map"}, joint));
+  check_added(damping, with({"damping_map"}, joint));
+  check_added(friction, with({"begin_friction", "friction_map", "revise_friction"}, joint));
+  check_added(limits, with({"begin_limits", "revise_limits"}, joint));
+  check_added(servo, with({"servo_map"}, joint));
+  check_added(limited, with({"servo_map", "revise_servos"}, joint));
+  check_added(torque, with({"torque_map"}, joint));
+  check_added(drag, with({"drag_map"}, body));
+  check_added(wrench, with({"wrench_map"}, body));
+  check_added(ground, with({"ground_map", "find_ground", "revise_ground"}, body));
+  CHECK(names_of(sweeps_of(model, options, empty_ground)) == plain);
+  CHECK_FALSE(EffectPlan(model, options, empty_ground).any());
+}
+
+}  // namespace linden
