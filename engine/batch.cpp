@@ -30,6 +30,7 @@ void check_batch(std::int64_t size, const BatchOptions& options) {
   const auto refuse = [](const char* what, std::string_view found, std::string_view only) {
     throw InputError(fmt::format("a batch has no {} \"{}\"; it knows \"{}\" (a Simulation has them all)", what, found, only));
   };
+  if (options.order != 2) refuse("order", fmt::format("{}", options.order), "2");
   if (options.solver != Solver::newton) refuse("solver", name(options.solver), name(Solver::newton));
   if (options.guess != FirstGuess::extrapolation) refuse("first guess", name(options.guess), name(FirstGuess::extrapolation));
   if (options.stop != StopTest::energy) refuse("stop test", name(options.stop), name(StopTest::energy));

@@ -1,9 +1,10 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
 //   "linden checkpoint 2\n"
-//   header: model hash, step, gravity, counts, steps taken, valid rows of history (little endian, as laid out below)
+//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order (little endian, as laid out below)
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
-//   what effects keep from step to step, likewise
+//   of every sub-step but the first: valid rows of its history, its history
+//   what effects keep from step to step, 8 bytes a number
 //   FNV-1a over all of it
 //
 // Raw bits, so that a run continued from it is bit-identical. Written beside the target and renamed: nothing half-written stays.
@@ -29,8 +30,9 @@ struct Header {
   std::int64_t positions, velocities;
   std::int64_t steps;
   std::int64_t history;
+  std::int64_t order;
 };
-static_assert(sizeof(Header) == 72, "a checkpoint's header has no padding");
+static_assert(sizeof(Header) == 80, "a checkpoint's header has no padding");
 
 std::uint64_t checksum(std::string_view bytes) {
   std::uint64_t state = 14695981039346656037ull;
@@ -52,12 +54,18 @@ void Simulation::save(const std::string& file) {
                       model_->tree.shape.positions,
                       model_->tree.shape.velocities,
                       steps_,
-                      history_};
+                      history_,
+                      options_.order};
   std::string bytes(kMagic);
   append(bytes, &header, 1);
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
     append(bytes, field.flat().data(), field.flat().size());
   });
+  for (const Past& past : past_) {
+    const std::int64_t rows = past.rows;
+    append(bytes, &rows, 1);
+    append(bytes, past.history.flat().data(), past.history.flat().size());
+  }
   for (const std::span<double> numbers : stepper_.effect_memory()) append(bytes, numbers.data(), numbers.size());
   const std::uint64_t sum = checksum(bytes);
   append(bytes, &sum, 1);
@@ -83,6 +91,11 @@ void Simulation::load(const std::string& file) {
                                  file, header.positions, header.velocities, model_->names.model, model_->tree.shape.positions,
                                  model_->tree.shape.velocities));
   }
+  if (header.order != options_.order) {
+    throw InputError(fmt::format("{}: this checkpoint was made with order {}; the simulation has order {}, so it would not continue the "
+                                 "same run",
+                                 file, header.order, options_.order));
+  }
   if (header.step != options_.step || !std::equal(std::begin(header.gravity), std::end(header.gravity), options_.gravity.begin())) {
     throw InputError(fmt::format("{}: this checkpoint was made with a step of {} s and gravity {} {} {}; the simulation has {} s and {} "
                                  "{} {}, so it would not continue the same run",
@@ -91,6 +104,8 @@ void Simulation::load(const std::string& file) {
   }
   std::size_t expected = body + sizeof(std::uint64_t);
   State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) { expected += field.bytes(); });
+  std::vector<Past> past = past_;
+  for (const Past& one : past) expected += sizeof(std::int64_t) + one.history.bytes();
   const std::vector<std::span<double>> memory = stepper_.effect_memory();
   for (const std::span<double> numbers : memory) expected += numbers.size_bytes();
   std::uint64_t sum = 0;
@@ -103,11 +118,19 @@ void Simulation::load(const std::string& file) {
     std::memcpy(field.flat().data(), next, field.bytes());
     next += field.bytes();
   });
+  for (Past& one : past) {
+    std::int64_t rows = 0;
+    std::memcpy(&rows, next, sizeof(rows));
+    one.rows = static_cast<int>(rows);
+    std::memcpy(one.history.flat().data(), next + sizeof(rows), one.history.bytes());
+    next += sizeof(rows) + one.history.bytes();
+  }
   for (const std::span<double> numbers : memory) {
     std::memcpy(numbers.data(), next, numbers.size_bytes());
     next += numbers.size_bytes();
   }
   state_ = loaded;
+  past_ = std::move(past);
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);
   effect_work_ = {};

@@ -93,7 +93,14 @@ void read_run_options(const Texts& texts, RunArguments& run) {
   if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
   if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
   if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
-  if (!texts.order.empty() && texts.order != "2") throw InputError(fmt::format("--order {}: only order 2 exists", texts.order));
+  if (!texts.order.empty()) {
+    const std::int64_t order = integer_from("--order", texts.order, "2, 4, 6 or 8");
+    if (order < 2 || order > 8 || order % 2 != 0) throw InputError(fmt::format("--order {}: expected 2, 4, 6 or 8", order));
+    // a tolerance that nobody chose goes with the order
+    const bool chosen = !texts.tolerance.empty() || run.options.tolerance != default_tolerance(run.options.order);
+    run.options.order = static_cast<int>(order);
+    if (!chosen) run.options.tolerance = default_tolerance(run.options.order);
+  }
 }
 
 void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
@@ -180,8 +187,8 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
   add("Method", "--stop", texts.stop, "NAME", "energy (default: relative) or absolute (|r| in N m s)");
-  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10");
-  add("Method", "--order", texts.order, "N", "of the integrator; 2");
+  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10, for orders 6 and 8 1e-13");
+  add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
   add("Output", "--record", run.record, "FILE.csv", "time, energy and all coordinates, one row a step");
   add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
   add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");

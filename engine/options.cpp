@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "engine/composition.hpp"
 #include "layout/input_error.hpp"
 
 namespace linden {
@@ -43,6 +44,8 @@ Choice choice_in(std::span<const Named<Choice>> list, const char* what, const st
 
 }  // namespace
 
+double default_tolerance(int order) { return order > 4 ? 1e-13 : Options().tolerance; }
+
 std::string_view name(Solver solver) { return name_in<Solver>(kSolvers, solver); }
 std::string_view name(FirstGuess guess) { return name_in<FirstGuess>(kGuesses, guess); }
 std::string_view name(StopTest stop) { return name_in<StopTest>(kStops, stop); }
@@ -55,6 +58,7 @@ void check(const Options& options) {
   if (!(options.step > 0) || !std::isfinite(options.step)) {
     throw InputError(fmt::format("the step is {} s; it must be positive and finite (1e-3 s suits most robots)", options.step));
   }
+  composition(options.order);
   if (!(options.tolerance > 0) || !std::isfinite(options.tolerance)) {
     throw InputError(fmt::format("the solver's tolerance is {}; it must be positive (default 1e-10)", options.tolerance));
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "engine/composition.hpp"
 #include "engine/effects_text.hpp"
 #include "engine/load_model.hpp"
 #include "engine/text.hpp"
@@ -32,6 +33,12 @@ double steps_per_second(const RunFigures& figures) { return static_cast<double>(
 
 double ns_per_body_step(const Model& model, const RunFigures& figures) {
   return 1e9 * figures.step_seconds / (static_cast<double>(figures.steps) * model.tree.bodies());
+}
+
+/// "order 4 (5 sub-steps), "; of order 2, which most runs have, nothing.
+std::string order_text(const Options& options) {
+  if (options.order == 2) return "";
+  return fmt::format("order {} ({} sub-steps), ", options.order, composition(options.order).size());
 }
 
 std::string plural(std::int64_t number, const char* one, const char* more) { return number == 1 ? one : more; }
@@ -62,8 +69,8 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) {
     row("ignored", left_out + "; a scene can name them");
   }
-  row("method", fmt::format("{}, step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), options.step,
-                            options.tolerance, name(options.stop), name(options.guess), gravity_text(options)));
+  row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), order_text(options),
+                            options.step, options.tolerance, name(options.stop), name(options.guess), gravity_text(options)));
   if (figures.steps == 0) return text;
 
   const double simulated = figures.simulated(options.step);
@@ -148,7 +155,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"guess", name(options.guess)},
       {"stop", name(options.stop)},
       {"tolerance", options.tolerance},
-      {"order", 2},
+      {"order", options.order},
       {"step", options.step},
       {"gravity", options.gravity},
       {"seed", random ? Json(random->seed) : Json(nullptr)},
@@ -206,9 +213,9 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
   }
   plot::Chart chart;
   chart.title = fmt::format("Energy drift of {}", printable(simulation.model().names.model));
-  chart.subtitle = fmt::format("{}, {}; {}, step {:g} s, {}, {}; start {}; H(0) = {:.6g} J",
+  chart.subtitle = fmt::format("{}, {}; {}, {}step {:g} s, {}, {}; start {}; H(0) = {:.6g} J",
                                counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
-                               options.step, counted(figures.steps, "step"), gravity_text(options), start_text(arguments, figures),
+                               order_text(options), options.step, counted(figures.steps, "step"), gravity_text(options), start_text(arguments, figures),
                                energy.initial());
   chart.x.label = "time [s]";
   const bool effects = !effect_lines(effects_of(arguments), simulation.model()).empty();

@@ -153,10 +153,14 @@ class SceneReader {
 
   void read_options() {
     Options& options = scene_.options;
+    bool tolerance = false;
     for (const auto& [key, value] : root_.entries("a scene")) {
       if (key == "step") options.step = value.positive();
       if (key == "duration") scene_.duration = value.positive();
-      if (key == "tolerance") options.tolerance = value.positive();
+      if (key == "tolerance") {
+        options.tolerance = value.positive();
+        tolerance = true;
+      }
       if (key == "solver") options.solver = solver_from(value.choice(names_of({Solver::newton, Solver::riqn})));
       if (key == "guess") {
         options.guess =
@@ -165,8 +169,12 @@ class SceneReader {
       if (key == "stop") options.stop = stop_from(value.choice(names_of({StopTest::energy, StopTest::absolute})));
       if (key == "max_iterations") options.max_iterations = value.integer(0, 1'000'000);
       if (key == "max_splits") options.max_splits = value.integer(0, 20);
-      if (key == "order" && value.number() != 2) value.refuse("2", "only order 2 exists");
+      if (key == "order") {
+        options.order = value.integer(2, 8);
+        if (options.order % 2 != 0) value.refuse("2, 4, 6 or 8", "odd orders do not exist");
+      }
     }
+    if (!tolerance) options.tolerance = default_tolerance(options.order);
     if (scene_.duration < options.step) {
       root_.fail(fmt::format("a duration of {} s is less than a step of {} s", scene_.duration, options.step), "one step or more",
                  "change one of them");

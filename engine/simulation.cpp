@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/composition.hpp"
 #include "engine/instance_stepper.hpp"
 #include "engine/scene.hpp"
 #include "layout/input_error.hpp"
@@ -14,8 +15,9 @@ namespace linden {
 
 namespace {
 
-std::shared_ptr<const Model> checked(std::shared_ptr<const Model> model, const Effects& effects) {
+std::shared_ptr<const Model> checked(std::shared_ptr<const Model> model, const Options& options, const Effects& effects) {
   check(effects, *model);
+  check_order(options.order, effects);
   return model;
 }
 
@@ -25,11 +27,18 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(checked(std::move(model), effects)), options_(options), plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
+    : model_(checked(std::move(model), options, effects)), options_(options), plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
       stepper_(*model_, options, plan_.get()) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
+  past_.resize(composition(options.order).size() - 1);
+  for (Past& past : past_) past.history.allocate(model_->tree.shape.velocities);
+  if (!past_.empty()) {
+    good_q_ = state_.q;
+    good_p_ = state_.p;
+    good_pace_.allocate(2);
+  }
   changed();
 }
 
@@ -48,6 +57,10 @@ void Simulation::changed() {
   history_ = 0;
   stepper_.forget();
   std::ranges::fill(state_.history.flat(), 0.0);
+  for (Past& past : past_) {
+    past.rows = 0;
+    std::ranges::fill(past.history.flat(), 0.0);
+  }
   std::ranges::fill(state_.pace.flat(), std::numeric_limits<double>::quiet_NaN());
   stepper_.refresh(state_);
 }
@@ -88,12 +101,35 @@ void Simulation::set_forces(std::span<const double> force) {
 }
 
 StepReport Simulation::step() {
-  const StepReport report = stepper_.step(state_, history_, time(), options_.step);
+  const StepReport report = past_.empty() ? stepper_.step(state_, history_, time(), options_.step) : step_in_stages();
   if (report.ok()) {
     ++steps_;
     effect_work_.add(stepper_.effect_work());
   }
   return report;
+}
+
+/// The displacements of a sub-step change smoothly from step to step; from one sub-step to the next they do not, so each has its own past.
+StepReport Simulation::step_in_stages() {
+  std::ranges::copy(state_.q.flat(), good_q_.flat().begin());
+  std::ranges::copy(state_.p.flat(), good_p_.flat().begin());
+  std::ranges::copy(state_.pace.flat(), good_pace_.flat().begin());
+  StepReport whole;
+  const std::span<const double> stages = composition(options_.order);
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    if (i > 0) std::swap(state_.history, past_[i - 1].history);
+    const StepReport report = stepper_.step(state_, i > 0 ? past_[i - 1].rows : history_, time(), stages[i] * options_.step);
+    if (i > 0) std::swap(state_.history, past_[i - 1].history);
+    whole.add(report);
+    if (report.ok()) continue;
+    // back to the beginning; sub-steps that were taken have lost part of their past, so all begin anew
+    std::ranges::copy(good_q_.flat(), state_.q.flat().begin());
+    std::ranges::copy(good_p_.flat(), state_.p.flat().begin());
+    changed();
+    std::ranges::copy(good_pace_.flat(), state_.pace.flat().begin());
+    break;
+  }
+  return whole;
 }
 
 Energy Simulation::energy() { return stepper_.energy_of(state_.p, rate_); }

@@ -66,14 +66,21 @@ class Simulation {
   const EffectWork<double>& effect_work() const { return effect_work_; }
   Momentum momentum();
 
-  /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step
-  /// or gravity, a file that is cut short or is no checkpoint; the simulation is then unchanged.
+  /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step,
+  /// order or gravity, a file that is cut short or is no checkpoint; the simulation is then unchanged.
   void save(const std::string& file);
   void load(const std::string& file);
 
  private:
+  /// What the first guess of a sub-step extrapolates from: displacements of the same sub-step of earlier steps, as in State.
+  struct Past {
+    Field<double, kHistory> history;
+    int rows = 0;  // valid
+  };
+
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
+  StepReport step_in_stages();
 
   std::shared_ptr<const Model> model_;
   Options options_;
@@ -84,6 +91,8 @@ class Simulation {
   EffectWork<double> effect_work_;
   std::int64_t steps_ = 0;
   int history_ = 0;
+  std::vector<Past> past_;    // of every sub-step but the first, whose past is the state's own
+  Field<double> good_q_, good_p_, good_pace_;  // at the beginning of a step of several sub-steps
 };
 
 }  // namespace linden

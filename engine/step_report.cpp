@@ -2,7 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace linden {
+
+void StepReport::add(const StepReport& more) {
+  status = more.status;
+  slot = more.slot;
+  iterations += more.iterations;
+  evaluations += more.evaluations;
+  factorisations += more.factorisations;
+  backtracks += more.backtracks;
+  substeps += more.substeps - 1;
+  at_rounding_floor |= more.at_rounding_floor;
+  residual = more.ok() ? std::max(residual, more.residual) : more.residual;
+}
 
 std::string describe(const StepReport& report, const Model& model, double step) {
   if (report.ok()) return {};

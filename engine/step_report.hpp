@@ -22,11 +22,13 @@ struct StepReport {
   int evaluations = 0;     // of the residual
   int factorisations = 0;  // of the Jacobian
   int backtracks = 0;      // corrections cut short
-  int substeps = 1;        // above 1: the step failed whole and was split
+  int substeps = 1;        // above 1: the step, or one of the sub-steps that an order above 2 is made of, failed whole and was split
   bool at_rounding_floor = false;  // stopped above the tolerance, where rounding lets the residual fall no further
   double residual = 0;      // sqrt(1/2 r.M^-1 r / kinetic energy) at the end, the largest over sub-steps
   Index slot = 0;           // where it failed: the body that turns too far or the joint with the largest residual; 0 = fine
 
+  /// Counts what another sub-step took; its status and trouble are those of the whole.
+  void add(const StepReport& more);
   bool ok() const { return status == StepStatus::converged; }
 };
 

@@ -324,7 +324,7 @@ Stepper::Evaluated Stepper::solve_and_correct(StepReport& report) {
 }
 
 bool Stepper::converged(const Evaluated& now, double norm, double h) const {
-  if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * h;
+  if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * std::abs(h);
   return 0.5 * norm <= options_.tolerance * options_.tolerance * now.scale;
 }
 
@@ -478,7 +478,19 @@ bool Stepper::gains_energy(const State<double>& state, double h) {
     for (Index row = 0; row < model_.tree.shape.velocities; ++row) activity += std::abs(work_.force(row) * work_.delta(row));
     gain -= activity;
   }
-  return gain > kMostGain * std::max(kinetic_, before);
+  const double most = kMostGain * std::max(kinetic_, before);
+  return gain > most && (options_.order == 2 || gain - push() > most);
+}
+
+/// Kinetic energy that the forces give in a whole step to what is at rest: neighbouring sub-steps of different length differ by so much
+/// where the motion turns back.
+double Stepper::push() {
+  if (one_pass_) std::swap(work_.innovation, work_.residual);  // what the solve left is still needed
+  velocity_of(work_.force, work_.increment);
+  if (one_pass_) std::swap(work_.innovation, work_.residual);
+  double sum = 0;
+  for (Index row = 0; row < model_.tree.shape.velocities; ++row) sum += work_.force(row) * work_.increment(row);
+  return 0.5 * options_.step * options_.step * sum;
 }
 
 /// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so.

@@ -53,7 +53,8 @@ class Stepper {
   /// Masses and inertias of an instance that differs from the model, followed by a refresh. They must live as long as they are used.
   void use(const BodyConstants<double>& constants) { constants_ = &constants; }
 
-  /// One step of `h` seconds, `time` at its beginning. `history`: how many rows of state.history are valid; updated.
+  /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
+  /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
   StepReport step(State<double>& state, int& history, double time, double h);
   /// What effects keep from step to step beside the state: part of a checkpoint.
   std::vector<std::span<double>> effect_memory();
@@ -103,6 +104,7 @@ class Stepper {
   Evaluated solve_and_correct(StepReport& report);
   bool converged(const Evaluated& now, double norm, double h) const;
   bool gains_energy(const State<double>& state, double h);
+  double push();
   template <class Action>
   void with_added(const Action& action);
   void begin_effects(const State<double>& state, int history, double h);

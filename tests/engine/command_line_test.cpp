@@ -291,6 +291,17 @@ TEST_CASE("models that cannot be simulated are refused with the place of the mis
   }
 }
 
+TEST_CASE("a run of higher order says so, and its solves are as exact as it is", "[command line]") {
+  const Shell shell;
+  const Outcome outcome = shell.linden("run chain:5 --order 8 --dt 4e-3 --duration 1 --json a.json");
+  CHECK(outcome.exit_code == 0);
+  CHECK_THAT(outcome.out, Contains("order 8 (17 sub-steps)") && Contains("tolerance 1e-13"));
+  const nlohmann::json json = nlohmann::json::parse(text_of(shell / "a.json"));
+  CHECK(json["order"] == 8);
+  CHECK(json["energy_band"].get<double>() < 1e-8 * json["energy_scale"].get<double>());
+  CHECK_THAT(shell.linden("run chain:5 --order 8 --tolerance 1e-11 --duration 0.1").out, Contains("tolerance 1e-11"));
+}
+
 TEST_CASE("options that make no sense are refused before anything is computed", "[command line]") {
   const Shell shell;
   check_refused(shell, "", "no command");
@@ -312,7 +323,8 @@ TEST_CASE("options that make no sense are refused before anything is computed", 
   check_refused(shell, "run chain:3 --guess ig4", "choose one of: extrapolation");
   check_refused(shell, "run chain:3 --stop never", "choose one of: energy");
   check_refused(shell, "run chain:3 --tolerance 0", "tolerance");
-  check_refused(shell, "run chain:3 --order 4", "only order 2 exists");
+  check_refused(shell, "run chain:3 --order 3", "expected 2, 4, 6 or 8");
+  check_refused(shell, "run chain:3 --order 10", "expected 2, 4, 6 or 8");
   check_refused(shell, "run chain:3 --seed -1", "--seed");
   check_refused(shell, "run chain:3 --spread nan", "--spread");
   check_refused(shell, "run chain:3 --base floating", "leave --base out");

@@ -517,7 +517,7 @@ TEST_CASE("values that make no sense are refused where they stand", "[scene]") {
   refused("step:\n", {"step is nothing"});
   refused("duration: 0\n", {"above zero"});
   refused("tolerance: -1\n", {"above zero"});
-  refused("order: 4\n", {"only order 2 exists"});
+  refused("order: 5\n", {"2, 4, 6 or 8"});
   refused("solver: newtn\n", {"expected one of newton, riqn", "did you mean newton?"});
   refused("guess: ig7\n", {"one of extrapolation, ig1"});
   refused("stop: [a]\n", {"one of energy, absolute"});
