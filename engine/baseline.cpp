@@ -40,14 +40,21 @@ void add(const Field<double>& from, double factor, const Field<double>& more, Fi
 std::string_view name(Scheme scheme) { return scheme == Scheme::rk4 ? "RK4" : "semi-implicit Euler"; }
 
 Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Options& options, const Effects& effects)
-    : model_(std::move(model)), scheme_(scheme), options_(options), effects_(effects),
-      gravity_(options.gravity != std::array<double, 3>{0, 0, 0}), ties_(model_->mimics, model_->tree.shape.velocities) {
+    : model_(std::move(model)),
+      scheme_(scheme),
+      options_(options),
+      effects_(effects),
+      gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
+      ties_(model_->mimics, model_->tree.shape.velocities) {
   check(options);
   check(effects, *model_);
-  check_order(4, effects);  // it is the same effects that are left
+  if (const std::string refused = irreversible(effects); !refused.empty()) {
+    throw InputError(fmt::format("{} knows gravity, armature and springs alone; the scene has {}", name(scheme), refused));
+  }
   const Shape& shape = model_->tree.shape;
   for (Field<double>* field : {&q_, &good_q_}) field->allocate(shape.positions);
-  for (Field<double>* field : {&v_, &good_v_, &stage_u_, &stage_v_, &rate_u_, &rate_v_, &sum_u_, &sum_v_}) field->allocate(shape.velocities);
+  for (Field<double>* field : {&v_, &good_v_, &stage_u_, &stage_v_, &rate_u_, &rate_v_, &sum_u_, &sum_v_})
+    field->allocate(shape.velocities);
   if (!effects_.armature.empty()) {
     rotor_.allocate(shape.velocities);
     for (const Armature& one : effects_.armature) rotor_(one.row) += one.inertia;
@@ -89,7 +96,8 @@ void Baseline::place() {
   }
   for (const BallSpring& spring : effects_.ball_springs) {
     const Index from = tree.first_q(spring.slot), row = tree.first_v(spring.slot);
-    const Vec3<double> turn = shorter_turn(rest_inverse<double>(spring) * Quaternion<double>{load3<double>(q_, from), q_(from + 3)});
+    const Vec3<double> turn =
+        shorter_turn(rest_inverse<double>(spring) * Quaternion<double>{load3<double>(q_, from), q_(from + 3)});
     store3(work_.force, row, load3<double>(work_.force, row) - spring.stiffness * turn);
     potential_ += 0.5 * spring.stiffness * dot(turn, turn);
   }
@@ -108,7 +116,8 @@ void Baseline::accelerate(const Field<double>& v, Field<double>& a) {
 
   const Gains<double> gains{work_.gain_up, work_.gain_down, work_.joint_inverse};
   if (rotor_.rows() > 0) {
-    articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains, EffectsAdded<double, true, false>{rotor_, none_});
+    articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains,
+                           EffectsAdded<double, true, false>{rotor_, none_});
   } else {
     articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains);
   }

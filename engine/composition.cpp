@@ -24,11 +24,11 @@ constexpr double kSuzuki = 0.41449077179437573714;  // 1 / (4 - 4^(1/3))
 
 constexpr auto kOrder2 = symmetric<1>({1.0});
 constexpr auto kOrder4 = symmetric<3>({kSuzuki, kSuzuki, -0.65796308717750294857});
-constexpr auto kOrder6 = symmetric<5>({0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023,
-                                       0.79854399093482996340});
-constexpr auto kOrder8 = symmetric<9>({0.13020248308889008088, 0.56116298177510838456, -0.38947496264484728641, 0.15884190655515560090,
-                                       -0.39590389413323757734, 0.18453964097831570709, 0.25837438768632204729, 0.29501172360931029887,
-                                       -0.60550853383003451170});
+constexpr auto kOrder6 = symmetric<5>(
+    {0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023, 0.79854399093482996340});
+constexpr auto kOrder8 = symmetric<9>({0.13020248308889008088, 0.56116298177510838456, -0.38947496264484728641,
+                                       0.15884190655515560090, -0.39590389413323757734, 0.18453964097831570709,
+                                       0.25837438768632204729, 0.29501172360931029887, -0.60550853383003451170});
 
 }  // namespace
 
@@ -42,8 +42,7 @@ std::span<const double> composition(int order) {
   }
 }
 
-void check_order(int order, const Effects& effects) {
-  if (order == 2) return;
+std::string irreversible(const Effects& effects) {
   std::vector<std::string_view> refused;
   const auto refuse = [&](bool there, std::string_view name) {
     if (there) refused.push_back(name);
@@ -56,10 +55,16 @@ void check_order(int order, const Effects& effects) {
   refuse(!effects.wrenches.empty(), "wrench");
   refuse(!effects.drag.empty(), "drag");
   refuse(effects.ground.has_value(), "ground");
+  return fmt::format("{}", fmt::join(refused, ", "));
+}
+
+void check_order(int order, const Effects& effects) {
+  const std::string refused = order == 2 ? "" : irreversible(effects);
   if (refused.empty()) return;
-  throw InputError(fmt::format("a step of order {} goes back in time between whiles, where effects that take energy would return it and "
-                               "those that act at given times have no place; the scene has {}: use order 2, or leave {} out",
-                               order, fmt::join(refused, ", "), refused.size() == 1 ? "it" : "them"));
+  throw InputError(
+      fmt::format("a step of order {} goes back in time between whiles, where effects that take energy would return it and "
+                  "those that act at given times have no place; the scene has {}: use order 2, or leave {} out",
+                  order, refused, refused.find(',') == refused.npos ? "it" : "them"));
 }
 
 }  // namespace linden

@@ -77,24 +77,28 @@ double EnergyDrift::slope_error() const {
 }
 
 std::optional<MomentumDrift> MomentumDrift::of(Simulation& simulation) {
-  if (!floats(simulation.model().tree)) return std::nullopt;
-  return MomentumDrift(simulation);
+  return of(simulation.model(), simulation.options().gravity, simulation.time(), simulation.positions(), simulation.momentum());
 }
 
-MomentumDrift::MomentumDrift(Simulation& simulation)
-    : gravity_(!vector_of(simulation.options().gravity).isZero(0)), begin_(simulation.time()), first_(simulation.momentum()) {
-  const MassDistribution masses = mass_distribution(simulation.model(), simulation.positions());
-  mass_ = masses.mass;
-  polar_moment_ = masses.polar_moment;
+std::optional<MomentumDrift> MomentumDrift::of(const Model& model, const std::array<double, 3>& gravity, double time,
+                                               std::span<const double> positions, const Momentum& first) {
+  if (!floats(model.tree)) return std::nullopt;
+  const MassDistribution masses = mass_distribution(model, positions);
+  MomentumDrift drift;
+  drift.gravity_ = gravity;
+  drift.begin_ = time;
+  drift.first_ = first;
+  drift.mass_ = masses.mass;
+  drift.polar_moment_ = masses.polar_moment;
+  return drift;
 }
 
-void MomentumDrift::add(Simulation& simulation, const Energy& energy) {
-  const Eigen::Vector3d gravity = vector_of(simulation.options().gravity);
-  const Momentum now = simulation.momentum();
-  const Eigen::Vector3d angular = vector_of(now.angular) - vector_of(first_.angular);
-  const Eigen::Vector3d linear = vector_of(now.linear) - vector_of(first_.linear);
-  linear_ = std::max(linear_, (linear - mass_ * (simulation.time() - begin_) * gravity).norm());
-  angular_ = std::max(angular_, gravity_ ? std::abs(angular.dot(gravity.normalized())) : angular.norm());
+void MomentumDrift::add(double time, const Momentum& now, const Energy& energy) {
+  const Eigen::Vector3d field = vector_of(gravity_);
+  const Eigen::Vector3d angular_change = vector_of(now.angular) - vector_of(first_.angular);
+  const Eigen::Vector3d linear_change = vector_of(now.linear) - vector_of(first_.linear);
+  linear_ = std::max(linear_, (linear_change - mass_ * (time - begin_) * field).norm());
+  angular_ = std::max(angular_, gravity() ? std::abs(angular_change.dot(field.normalized())) : angular_change.norm());
   kinetic_ = std::max(kinetic_, energy.kinetic);
 }
 

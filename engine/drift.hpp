@@ -66,19 +66,23 @@ class MomentumDrift {
  public:
   /// Nothing where something outside takes momentum.
   static std::optional<MomentumDrift> of(Simulation& simulation);
+  /// The same of whoever moves the model: `first` is its momentum at `positions` and `time`.
+  static std::optional<MomentumDrift> of(const Model& model, const std::array<double, 3>& gravity, double time,
+                                         std::span<const double> positions, const Momentum& first);
 
-  void add(Simulation& simulation, const Energy& energy);
+  void add(Simulation& simulation, const Energy& energy) { add(simulation.time(), simulation.momentum(), energy); }
+  void add(double time, const Momentum& now, const Energy& energy);
 
-  bool gravity() const { return gravity_; }
+  bool gravity() const { return gravity_ != std::array<double, 3>{0, 0, 0}; }
   /// Largest drift so far, relative to the largest momentum that the kinetic energy allows: |P| <= sqrt(2 m T),
   /// |L| <= sqrt(2 J T), J the polar moment about the world's origin at the start.
   double linear() const;
   double angular() const;
 
  private:
-  explicit MomentumDrift(Simulation& simulation);
+  MomentumDrift() = default;
 
-  bool gravity_ = false;
+  std::array<double, 3> gravity_{};
   double mass_ = 0, polar_moment_ = 0, begin_ = 0, kinetic_ = 0;
   double linear_ = 0, angular_ = 0;  // largest drift [kg m/s], [kg m^2/s]
   Momentum first_;

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/accuracy_command.hpp"
 #include "engine/inspect.hpp"
 #include "engine/load_model.hpp"
 #include "engine/rollout_command.hpp"
@@ -32,7 +33,7 @@ namespace {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      shape, dofs, steps;
+      shape, dofs, steps, budget;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -137,6 +138,17 @@ void read_scaling_options(const Texts& texts, ScalingArguments& scaling) {
   scaling.steps = step_count(motion, scaling.options.step);
 }
 
+void read_accuracy_options(const Texts& texts, AccuracyArguments& accuracy) {
+  read_motion_options(texts, accuracy, accuracy.options);
+  accuracy.scene = scene_named(accuracy.model, accuracy.base, {accuracy.seed, accuracy.spread});
+  if (accuracy.scene) {
+    accuracy.options = accuracy.scene->options;
+    accuracy.duration = accuracy.scene->duration;
+    read_motion_options(texts, accuracy, accuracy.options);
+  }
+  if (!texts.budget.empty()) accuracy.budget = number_from("--budget", texts.budget, "seconds, such as 60");
+}
+
 void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
   read_model_options(texts, inspect.base, inspect.options);
   inspect.scene = scene_named(inspect.model, inspect.base, {});
@@ -187,7 +199,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
   add("Method", "--stop", texts.stop, "NAME", "energy (default: relative) or absolute (|r| in N m s)");
-  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10, for orders 6 and 8 1e-13");
+  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10, above order 2 less");
   add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
   add("Output", "--record", run.record, "FILE.csv", "time, energy and all coordinates, one row a step");
   add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
@@ -253,6 +265,29 @@ CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling
   return command;
 }
 
+CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accuracy) {
+  CLI::App* command =
+      program.add_subcommand("accuracy", "Measure what accuracy costs on a model or scene, and say which method to use.");
+  const Adding add{command};
+  add.model(accuracy.model, kSceneHelp);
+  add.base("Motion", texts);
+  add.duration(texts);
+  add("Motion", "--dt", texts.dt, "S", "steps from 16 times to a quarter of this are tried, default 1e-3");
+  add.gravity("Motion", texts);
+  add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
+  add.spread("Start", texts);
+  add("Study", "--budget", texts.budget, "S", "seconds that all of it may take, default 60");
+  add("Output", "--json", accuracy.json, "FILE.json", "rows, fits and advice, for scripts");
+  add("Output", "--plot", accuracy.plot, "FILE.svg|png", "error and energy over CPU time");
+  command->footer(
+      "Runs orders 2, 4, 6, 8, RK4 and semi-implicit Euler against a reference that two methods agree on. Ctrl-C ends it early and\n"
+      "keeps the rows that are done.\n\n"
+      "Examples:\n"
+      "  linden accuracy chain:10 --duration 2 --plot accuracy.png\n"
+      "  linden accuracy models/humanoid.urdf --base floating --spread 0.5 --budget 30 --json accuracy.json");
+  return command;
+}
+
 CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
   CLI::App* command =
       program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
@@ -300,6 +335,7 @@ int run_program(int argc, char** argv) {
   program.footer("Examples:\n"
                  "  linden run chain:100 --duration 5 --plot energy.png\n"
                  "  linden rollout models/humanoid.urdf --base floating --instances 4096 --duration 1\n"
+                 "  linden accuracy chain:10 --duration 2\n"
                  "  linden scaling --dofs 10..10000\n"
                  "  linden inspect models/humanoid.urdf --base floating\n\n"
                  "linden COMMAND --help says more.");
@@ -308,9 +344,11 @@ int run_program(int argc, char** argv) {
   RunArguments run_arguments;
   RolloutArguments rollout_arguments;
   ScalingArguments scaling_arguments;
+  AccuracyArguments accuracy_arguments;
   InspectArguments inspect_arguments;
   const CLI::App* run = add_run(program, texts, run_arguments);
   const CLI::App* rollout = add_rollout(program, texts, rollout_arguments);
+  const CLI::App* accuracy = add_accuracy(program, texts, accuracy_arguments);
   const CLI::App* scaling = add_scaling(program, texts, scaling_arguments);
   const CLI::App* inspection = add_inspect(program, texts, inspect_arguments);
   program.allow_extras();
@@ -324,7 +362,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
     std::string help = "linden";
-    for (const CLI::App* command : {run, rollout, scaling, inspection}) {
+    for (const CLI::App* command : {run, rollout, accuracy, scaling, inspection}) {
       if (!command->parsed()) continue;
       help = "linden " + command->get_name();
       refuse_leftovers(*command, help);
@@ -342,6 +380,11 @@ int run_program(int argc, char** argv) {
     read_rollout_options(texts, rollout_arguments);
     return rollout_command(rollout_arguments);
   }
+  if (accuracy->parsed()) {
+    refuse_leftovers(*accuracy, "linden accuracy");
+    read_accuracy_options(texts, accuracy_arguments);
+    return accuracy_command(accuracy_arguments);
+  }
   if (scaling->parsed()) {
     refuse_leftovers(*scaling, "linden scaling");
     read_scaling_options(texts, scaling_arguments);
@@ -352,7 +395,7 @@ int run_program(int argc, char** argv) {
     read_inspect_options(texts, inspect_arguments);
     return inspect(inspect_arguments);
   }
-  throw InputError("no command given; choose run, rollout, scaling or inspect; linden --help says more");
+  throw InputError("no command given; choose run, rollout, accuracy, scaling or inspect; linden --help says more");
 }
 
 int complain(std::string_view message, int exit_code) {

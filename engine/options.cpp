@@ -44,7 +44,7 @@ Choice choice_in(std::span<const Named<Choice>> list, const char* what, const st
 
 }  // namespace
 
-double default_tolerance(int order) { return order > 4 ? 1e-13 : Options().tolerance; }
+double default_tolerance(int order) { return order > 4 ? 1e-13 : order > 2 ? 1e-12 : Options().tolerance; }
 
 std::string_view name(Solver solver) { return name_in<Solver>(kSolvers, solver); }
 std::string_view name(FirstGuess guess) { return name_in<FirstGuess>(kGuesses, guess); }

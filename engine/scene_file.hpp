@@ -13,8 +13,8 @@
 //                    angular_velocity}; several are one system, links and joints of each called name/link and name/joint, where
 //                    the name is the model's own unless it is given
 //   base             fixed (default) or floating, for a URDF file
-//   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; orders 6
-//                    and 8 have a tolerance of 1e-13 where none is given
+//   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; where no
+//                    tolerance is given it goes with the order
 //   initial          engine/scene_start.hpp
 //   effects          engine/scene_effects.hpp; gravity is one of them: without its key there is none
 //

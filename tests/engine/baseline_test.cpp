@@ -1,4 +1,5 @@
-// Semi-implicit Euler and RK4 as comparators: of their order on every kind of joint, and on the same motion as linden's own steps.
+// Semi-implicit Euler and RK4 as comparators: of their order on every kind of joint, and on the same motion as linden's own
+// steps.
 #include <cmath>
 
 #include "engine/baseline.hpp"
@@ -9,7 +10,8 @@
 namespace linden {
 namespace {
 
-std::vector<double> end_of(const Model& model, Scheme scheme, double h, double duration, double spread, const Effects& effects = {}) {
+std::vector<double> end_of(const Model& model, Scheme scheme, double h, double duration, double spread,
+                           const Effects& effects = {}) {
   const auto shared = std::make_shared<const Model>(model);
   Baseline baseline(shared, scheme, {.step = h}, effects);
   const InitialState start = random_state(model, 3, spread);
@@ -31,15 +33,19 @@ TEST_CASE("RK4 is of fourth order and semi-implicit Euler of first, towards the 
     Model model;
     double h, spread;  // h: where RK4's error is its own and not rounding
   };
-  for (const Case& given : {Case{chain(5), 2e-3, 0.2}, Case{ball_chain(3), 2e-3, 0.2}, Case{random_tree({.bodies = 8, .seed = 4}), 16e-3, 0.2},
-                            Case{load_urdf(model_file("humanoid.urdf"), Base::floating), 16e-3, 6},
-                            Case{load_urdf(model_file("hand.urdf")), 16e-3, 2}}) {
+  for (const Case& given :
+       {Case{chain(5), 2e-3, 0.2}, Case{ball_chain(3), 2e-3, 0.2}, Case{random_tree({.bodies = 8, .seed = 4}), 16e-3, 0.2},
+        Case{load_urdf(model_file("humanoid.urdf"), Base::floating), 16e-3, 6},
+        Case{load_urdf(model_file("hand.urdf")), 16e-3, 2}}) {
     CAPTURE(given.model.names.model);
     const std::vector<double> end = exact(given.model, 0.192, given.spread);
-    const auto error = [&](Scheme scheme, double h) { return distance(end_of(given.model, scheme, h, 0.192, given.spread), end); };
+    const auto error = [&](Scheme scheme, double h) {
+      return distance(end_of(given.model, scheme, h, 0.192, given.spread), end);
+    };
     CHECK(std::log2(error(Scheme::rk4, given.h) / error(Scheme::rk4, given.h / 2)) == Approx(4).margin(0.15));
     CHECK(error(Scheme::rk4, given.h / 2) < 1e-6);
-    CHECK(std::log2(error(Scheme::semi_implicit_euler, 2e-4) / error(Scheme::semi_implicit_euler, 1e-4)) == Approx(1).margin(0.1));
+    CHECK(std::log2(error(Scheme::semi_implicit_euler, 2e-4) / error(Scheme::semi_implicit_euler, 1e-4)) ==
+          Approx(1).margin(0.1));
   }
 }
 
