@@ -180,6 +180,14 @@ class Measurement {
     return std::move(figures_);
   }
 
+  AccuracyRow energy(const AccuracyMethod& method, double step, double tolerance, double kinetic) {
+    every_ = std::max(1.0, std::round(every_ / step)) * step;
+    figures_.duration = every_ * std::max(1.0, std::round(setup_.duration / every_));
+    figures_.reference.kinetic = kinetic;
+    judged_ = -1;
+    return row(method, step, tolerance);
+  }
+
  private:
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
 
@@ -416,7 +424,6 @@ class Measurement {
     for (const int order : {2, 6}) {
       for (const double tolerance : kTolerances) add({Kind::composed, order}, step, tolerance, before = 0, false);
     }
-    const Effects none;
     const bool plain = setup_.effects.armature.empty() && setup_.effects.springs.empty() && setup_.effects.ball_springs.empty();
     if (plain) add({Kind::single, 2}, step, 0, before = 0, false);
   }
@@ -453,6 +460,11 @@ AccuracyFigures measure_accuracy(const AccuracySetup& setup, const std::function
   return Measurement(setup, go_on).figures();
 }
 
+AccuracyRow measure_energy(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance,
+                           double kinetic) {
+  return Measurement(setup, [](double) { return true; }).energy(method, step, tolerance, kinetic);
+}
+
 std::vector<AccuracyFit> accuracy_fits(const AccuracyFigures& figures) {
   constexpr double kCoarse = 0.01, kCoarseOfLowOrder = 0.1, kFloor = 1e-13, kFalls = 1.6;
   constexpr std::size_t kRows = 3;
@@ -479,7 +491,7 @@ std::vector<AccuracyFit> accuracy_fits(const AccuracyFigures& figures) {
     AccuracyFit fit{method, kUnknown, 0, 0, static_cast<int>(rows.size())};
     LineFit line;
     for (const AccuracyRow* row : rows) line.add(std::log(row->step), std::log(row->error));
-    if (rows.size() >= 2) fit = {method, line.slope(), rows.front()->step, rows.back()->step, fit.rows};
+    if (rows.size() == kRows) fit = {method, line.slope(), rows.front()->step, rows.back()->step, fit.rows};
     fits.push_back(fit);
   }
   return fits;

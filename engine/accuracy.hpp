@@ -81,7 +81,7 @@ struct AccuracyReference {
 /// the gap.
 struct AccuracyFit {
   AccuracyMethod method;
-  double order = 0, from = 0, to = 0;  // largest and smallest step; order: NaN below two rows
+  double order = 0, from = 0, to = 0;  // largest and smallest step; order: NaN below three rows
   int rows = 0;
 };
 
@@ -97,6 +97,10 @@ struct AccuracyFigures {
 /// go_on(seconds): asked often, with the seconds that have gone by; false ends the measurement early and keeps the rows that are
 /// done.
 AccuracyFigures measure_accuracy(const AccuracySetup& setup, const std::function<bool(double seconds)>& go_on);
+
+/// One run without a reference: energy, momentum, time. Energies relative to `kinetic` [J]; the error is NaN.
+AccuracyRow measure_energy(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance,
+                           double kinetic);
 
 std::vector<AccuracyFit> accuracy_fits(const AccuracyFigures& figures);
 

@@ -195,8 +195,8 @@ nlohmann::ordered_json accuracy_json(const AccuracyArguments& arguments, const A
                     {"nominal_order", fit.method.order},
                     {"order", if_any(true, fit.order)},
                     {"steps", fit.rows},
-                    {"step_from", if_any(fit.rows >= 2, fit.from)},
-                    {"step_to", if_any(fit.rows >= 2, fit.to)}});
+                    {"step_from", if_any(std::isfinite(fit.order), fit.from)},
+                    {"step_to", if_any(std::isfinite(fit.order), fit.to)}});
   }
   return Json{
       {"command", "accuracy"},

@@ -4,15 +4,17 @@
 //   FreeBody       asymmetric, no forces               body rates a1 cn, a2 sn, a3 dn; the precession about L by a quadrature
 //   LagrangeTop    symmetric, heavy, one point fixed   cos theta = u1 + (u2 - u1) sn^2(K - kappa t, k)
 //
-// Each says its model, its start and where it is at a time. long double throughout, so that nothing is lost to double precision.
+// Each says its model, its start, where it is at a time and how far from there given positions are. long double throughout, so that nothing is lost to double precision.
 //
 // source  Landau, Lifshitz, Mechanics, paragraphs 11, 36, 37; Whittaker, Analytical Dynamics, 44, 69, 71;
 //         sn, cn, dn by the arithmetic-geometric mean: Abramowitz, Stegun, Handbook of Mathematical Functions, 16.4
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "layout/builder.hpp"
 
@@ -76,13 +78,15 @@ class Pendulum {
                       k = std::sin(static_cast<long double>(amplitude_) / 2);
     return 2 * std::asin(k * elliptic(quarter_period(k) - omega * time, k).sn);
   }
+  double error(double time, std::span<const double> q) const { return std::abs(static_cast<double>(q[0] - angle(time))); }
 
  private:
   static constexpr double kMass = 2, kLength = 0.4;
   double amplitude_;
 };
 
-/// A body that spins about its axis of middle inertia and turns over, again and again; its centre of mass rests. L points along z.
+/// A body that spins about its axis of middle inertia and turns over, again and again, about a centre of mass at rest. L points
+/// along z.
 class FreeBody {
  public:
   FreeBody() {
@@ -118,6 +122,14 @@ class FreeBody {
     const long double c = std::cos(tilt / 2), s = std::sin(tilt / 2);
     return {s * std::cos((turned - spin) / 2), s * std::sin((turned - spin) / 2), c * std::sin((turned + spin) / 2),
             c * std::cos((turned + spin) / 2)};
+  }
+  /// Angle between the orientations, nearly.
+  double error(double time, std::span<const double> q) const {
+    const auto exact = orientation(time);
+    long double along = 0, most = 0;
+    for (std::size_t k = 0; k < 4; ++k) along += exact[k] * q[k];
+    for (std::size_t k = 0; k < 4; ++k) most = std::max(most, std::abs(2 * (exact[k] - std::copysign(1.0L, along) * q[k])));
+    return static_cast<double>(most);
   }
 
  private:
@@ -167,6 +179,10 @@ class LagrangeTop {
     const long double k = std::sqrt((u0 - u1) / (u3 - u1)), kappa = std::sqrt(beta * (u3 - u1)) / 2;
     const long double sn = elliptic(quarter_period(k) - kappa * time, k).sn;
     return u1 + (u0 - u1) * sn * sn;
+  }
+  static double error(double time, std::span<const double> q) {
+    const long double x = q[0], y = q[1];
+    return std::abs(static_cast<double>(1 - 2 * (x * x + y * y) - upright(time)));
   }
 
  private:
