@@ -7,7 +7,8 @@
 //
 //   closed forms  error over h of every order and of RK4: pendulum, free body, Lagrange's top (tests/reference/closed_forms.hpp)
 //   scenes        what `linden accuracy` measures, over 10 s: pendulum, heavy top, free body, ten-link chain, tumbling humanoid
-//   long          energy and momentum over 1, 10 and 1,000 s, over CPU time per simulated second: ten-link chain, tumbling humanoid
+//   long          energy and momentum over 1, 10 and 1,000 s, over CPU time per simulated second: ten-link chain, tumbling
+//                 humanoid
 //   tolerance     what a looser solver does to energy and momentum over 50 s, and what it saves
 //
 // All times of a table are from one run of this program on one thread, so that they can be compared with each other.

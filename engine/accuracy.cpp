@@ -25,6 +25,8 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr int kLargest = 16, kLadder = 7;  // largest step in steps of the options, steps of the ladder
 constexpr double kTolerances[] = {1e-6, 1e-8, 1e-10, 1e-12};
 constexpr double kReferenceTolerance = 1e-13, kSettledGap = 1e-12;
+/// Smallest steps of the reference in steps of the options: on chaotic motions half a step more gains no more than a moment.
+constexpr double kSmallest = 1.0 / 8, kSmallestOfRk4 = 1.0 / 32;
 constexpr double kReferenceShare = 0.22;  // of the budget, for each of the two
 constexpr double kShort = 0.03;           // CPU seconds below which a run is timed again
 
@@ -294,11 +296,11 @@ class Measurement {
 
   /// Halves the step until the motion changes no more against `other` (null: against itself) or the time is up. Nothing where no
   /// run got through.
-  std::optional<Motion> refined(const AccuracyMethod& method, double& step, double until, const Motion* other) {
+  std::optional<Motion> refined(const AccuracyMethod& method, double& step, double smallest, double until, const Motion* other) {
     std::optional<Motion> best;
     Agreement last;
     double taken = 0;
-    for (double h = step;; h /= 2) {
+    for (double h = step; h > 0.99 * smallest; h /= 2) {
       const double begin = elapsed();
       if (best && begin + 2.2 * taken > until) break;
       Motion motion = run(method, h, kReferenceTolerance, until, samples(), [](std::int64_t) { return true; });
@@ -334,13 +336,14 @@ class Measurement {
     const double h = setup_.options.step;
     reference.step = std::min(4 * h, every_);
     reference.rk4_step = h;
-    std::optional<Motion> ours = refined(kMethods[3], reference.step, elapsed() + kReferenceShare * setup_.budget, nullptr);
+    std::optional<Motion> ours =
+        refined(kMethods[3], reference.step, kSmallest * h, elapsed() + kReferenceShare * setup_.budget, nullptr);
     if (!ours) {
       reference.failure = "no run of order 8 came to its end";
       return;
     }
     const std::optional<Motion> theirs =
-        refined(kMethods[4], reference.rk4_step, elapsed() + kReferenceShare * setup_.budget, &*ours);
+        refined(kMethods[4], reference.rk4_step, kSmallestOfRk4 * h, elapsed() + kReferenceShare * setup_.budget, &*ours);
     if (!theirs) {
       reference.failure = "no run of RK4 came to its end";
       return;

@@ -6,10 +6,10 @@
 //   steps      16, 8, 4, 2, 1, 1/2, 1/4 times the step of the options
 //   also       the solver's tolerance from 1e-6 to 1e-12 for orders 2 and 6, and order 2 in single precision, all at the step of
 //              the options
-//   reference  order 8 and RK4, their steps halved until they change no more or their share of the budget is spent. Where they
-//              agree to kAgreed over the whole duration errors are judged at its end. Where they do not the motion is chaotic as
-//              far as anybody can tell: errors are judged at the horizon, the last time to which they agree to kJudged, and
-//              beyond it energy alone is.
+//   reference  order 8 and RK4, their steps halved until they change no more, are 1/8 and 1/32 of the options' or their share of
+//              the budget is spent. Where they agree to kAgreed over the whole duration errors are judged at its end. Where they
+//              do not the motion is chaotic as far as anybody can tell: errors are judged at the horizon, the last time to which
+//              they agree to kJudged, and beyond it energy alone is.
 //   error      largest difference of a coordinate to the reference [rad, m]; of a quaternion twice its components', an angle.
 //              Never less than what the two references leave open.
 //   energy     band max H - min H and slope of H, sampled every largest step, relative to the largest kinetic energy of the

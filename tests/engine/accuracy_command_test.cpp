@@ -20,7 +20,7 @@ std::vector<nlohmann::json> ladder(const nlohmann::json& json, const std::string
 
 TEST_CASE("accuracy measures every method on a ladder of steps, finds their orders and says what to take", "[command line]") {
   const Shell shell;
-  const Outcome outcome = shell.linden("accuracy tree:7 --spread 1 --duration 0.32 --dt 2e-3 --budget 20 --json a.json");
+  const Outcome outcome = shell.linden("accuracy tree:7 --spread 1 --duration 0.32 --dt 2e-3 --budget 60 --json a.json");
   CHECK(outcome.exit_code == 0);
   CHECK(outcome.err.empty());
   CHECK_THAT(outcome.out,
@@ -61,7 +61,7 @@ TEST_CASE("accuracy measures every method on a ladder of steps, finds their orde
 TEST_CASE("a chaotic motion is recognised, judged on a horizon and by its energy, and runs that fail are shown",
           "[command line]") {
   const Shell shell;
-  const Outcome outcome = shell.linden("accuracy chain:10 --duration 4 --budget 20 --json a.json");
+  const Outcome outcome = shell.linden("accuracy chain:10 --duration 3 --budget 60 --json a.json");
   CHECK(outcome.exit_code == 0);
   CHECK_THAT(outcome.out, Contains("as on a chaotic motion: errors are judged there"));
   CHECK_THAT(outcome.out, Contains("semi-implicit Euler, h = 4 ms: at 1.784 s: the result is not finite"));
@@ -81,7 +81,7 @@ TEST_CASE("on a floating model momentum is compared too, and no method but Euler
   const Shell shell;
   REQUIRE(shell
               .linden("accuracy " LINDEN_MODELS_DIR
-                      "/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --duration 0.2 --budget 10 "
+                      "/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --duration 0.2 --budget 60 "
                       "--json a.json")
               .exit_code == 0);
   const nlohmann::json json = json_of(shell / "a.json");
@@ -107,7 +107,7 @@ TEST_CASE("a budget is kept: what does not fit is left out or cut short, and sai
 
 TEST_CASE("the pictures of an accuracy study name axes and methods", "[command line]") {
   const Shell shell;
-  REQUIRE(shell.linden("accuracy chain:2 --duration 0.2 --budget 5 --plot a.svg").exit_code == 0);
+  REQUIRE(shell.linden("accuracy chain:2 --duration 0.2 --budget 60 --plot a.svg").exit_code == 0);
   for (const char* word : {"What accuracy costs", "CPU time [s]", "error at 0.192 s [rad, m]", "energy band", "order 8", "RK4",
                            "semi-implicit Euler"}) {
     CHECK_THAT(text_of(shell / "a.svg"), Contains(word));
@@ -120,7 +120,7 @@ TEST_CASE("a scene brings its start and its springs into the study", "[command l
   shell.write("s.yaml",
               "model: chain:2\nduration: 0.2\ninitial: {positions: {joint1: 0.5}}\n"
               "effects: {gravity: [0, 0, -9.81], spring: {joint1: {stiffness: 0.2}}, armature: 1e-4}\n");
-  const Outcome outcome = shell.linden("accuracy s.yaml --budget 5 --json a.json");
+  const Outcome outcome = shell.linden("accuracy s.yaml --budget 60 --json a.json");
   INFO(outcome.err);
   CHECK(outcome.exit_code == 0);
   const nlohmann::json json = json_of(shell / "a.json");

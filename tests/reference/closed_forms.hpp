@@ -4,7 +4,8 @@
 //   FreeBody       asymmetric, no forces               body rates a1 cn, a2 sn, a3 dn; the precession about L by a quadrature
 //   LagrangeTop    symmetric, heavy, one point fixed   cos theta = u1 + (u2 - u1) sn^2(K - kappa t, k)
 //
-// Each says its model, its start, where it is at a time and how far from there given positions are. long double throughout, so that nothing is lost to double precision.
+// Each says its model, its start, where it is at a time and how far from there given positions are. long double throughout, so
+// that nothing is lost to double precision.
 //
 // source  Landau, Lifshitz, Mechanics, paragraphs 11, 36, 37; Whittaker, Analytical Dynamics, 44, 69, 71;
 //         sn, cn, dn by the arithmetic-geometric mean: Abramowitz, Stegun, Handbook of Mathematical Functions, 16.4
