@@ -57,7 +57,7 @@ BodyConstants<Real> rounded(const BodyConstants<double>& from, const Shape& shap
 template <class Real>
 std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockSetup<Real>& setup) {
   switch (instructions) {
-#ifdef LINDEN_X86
+#ifdef LINDEN_WIDE_LANES
     case Instructions::avx512: return make_block_stepper<Instructions::avx512>(setup);
     case Instructions::avx2: return make_block_stepper<Instructions::avx2>(setup);
 #endif
@@ -87,7 +87,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, pace, applied, mass, contacts;
+  Numbers<Real> q, p, pace, applied, mass, targets, contacts;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -120,6 +120,7 @@ struct BatchOf<Real>::Data {
     });
   }
 
+  Index servos() const { return static_cast<Index>(plan.effects.servos.size()); }
   const Shape& shape() const { return model->tree.shape; }
   std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
 
@@ -131,6 +132,7 @@ struct BatchOf<Real>::Data {
             pace.data() + at(b, 2),
             applied.empty() ? nullptr : applied.data() + at(b, nv),
             mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
+            targets.empty() ? nullptr : targets.data() + at(b, servos()),
             contacts.empty() ? nullptr : contacts.data() + at(b, static_cast<Index>(plan.ground.points.size())),
             records.data() + b * lanes,
             static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
@@ -260,6 +262,20 @@ template <class Real>
 BatchView<Real> BatchOf<Real>::forces() {
   if (data_->applied.empty()) data_->applied.assign(data_->p.size(), Real(0));
   return {data_->applied, data_->shape().velocities, lanes()};
+}
+
+template <class Real>
+BatchView<Real> BatchOf<Real>::servo_targets() {
+  if (data_->targets.empty()) {
+    data_->targets.resize(data_->at(data_->blocks, data_->servos()));
+    data_->for_blocks([&](std::int64_t b, typename Data::Worker&) {
+      Real* to = data_->targets.data() + data_->at(b, data_->servos());
+      for (const Servo& servo : data_->plan.effects.servos) {
+        for (int l = 0; l < lanes(); ++l) *to++ = static_cast<Real>(servo.target);
+      }
+    });
+  }
+  return {data_->targets, data_->servos(), lanes()};
 }
 
 template <class Real>

@@ -100,6 +100,9 @@ class BatchOf {
   /// call makes room for them, all zero.
   BatchView<Real> forces();
 
+  /// Targets of the servos [rad, m] in the order of Effects::servos, likewise: rows to be written at will, at first those of the effects.
+  BatchView<Real> servo_targets();
+
   /// Mass m [kg], first moment m c [kg m] and inertia xx xy xz yy yz zz [kg m^2] about the body frame's origin, of one body of one
   /// instance; the first call gives every instance masses of its own. Keeps positions and momenta, so set it before reset. Throws
   /// InputError for an inertia that is not positive definite.

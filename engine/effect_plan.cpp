@@ -104,7 +104,10 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
       servo_share.push_back(begin_share((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row)));
     }
   }
-  const auto mass = [&](Index slot) { return model.constants.inertia(slot, 0) > 0 ? model.constants.inertia(slot, 0) : model.constants.subtree_mass(slot); };
+  const auto mass = [&](Index slot) {
+    const double own = model.constants.inertia(slot, 0);
+    return own > 0 ? own : model.constants.subtree_mass(slot);
+  };
   for (const Drag& one : effects.drag) {
     // a falling body reaches sqrt(m g / b2) at most
     drag_share.push_back(begin_share(h * (one.linear / mass(one.slot) + std::sqrt(one.quadratic * kUsualGravity / mass(one.slot)))));

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "engine/effect_plan.hpp"
 #include "kernels/effects/armature.hpp"
@@ -191,7 +192,8 @@ class EffectSweeps {
 
   /// States that belong to the solution so far. `settled`: the residual is small, so that impulses that hold can be judged. delta is
   /// changed where a joint comes to rest. Of what sticks too hard all start to slide, or, where `one_by_one`, that alone which does
-  /// most: slower, and hardly ever in a circle. Softly only limits have states to revise. Returns in which instances something changed: the factor is out of date there.
+  /// most: slower, and hardly ever in a circle. Softly only limits have states to revise. Returns in which instances
+  /// something changed: the factor is out of date there.
   template <class Mask>
   auto revise(const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
     using std::max;
@@ -361,6 +363,16 @@ class EffectSweeps {
   Drags<S> drags_;
   Wrenches<S> wrenches_;
   S ground_potential_ = S(0.0), ground_before_ = S(0.0);
+};
+
+/// Null where a scene has no effects. bench/pay_as_you_go compiles linden as if there were none at all, and counts.
+template <class S>
+class EffectsPointer : public std::unique_ptr<EffectSweeps<S>> {
+ public:
+  using std::unique_ptr<EffectSweeps<S>>::operator=;
+#ifdef LINDEN_WITHOUT_EFFECTS
+  explicit operator bool() const noexcept { return false; }
+#endif
 };
 
 }  // namespace linden

@@ -22,6 +22,11 @@ class InstanceStepper {
   /// Generalized forces [nv] to be written; from the first call on they count.
   std::span<double> applied();
 
+  /// How contact point k ended the step (EffectSweeps::contact).
+  double contact(Index k) const { return stepper_.contact(k); }
+  /// Targets of the plan's servos, to be written.
+  std::span<double> servo_targets() { return stepper_.servo_targets(); }
+
   /// One step of the state, from `time` on. state().pace says what is known of the step before.
   StepReport step(double time);
   /// p = M(q) v.

@@ -10,7 +10,7 @@ bool available(Instructions instructions) {
   switch (instructions) {
     case Instructions::scalar:
     case Instructions::baseline: return true;
-#ifdef LINDEN_X86
+#ifdef LINDEN_WIDE_LANES
     case Instructions::avx2: return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     case Instructions::avx512:
       return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&

@@ -41,7 +41,7 @@ namespace linden {
 inline constexpr int kMostCorrections = 8;
 
 /// With effects, whose states may take some corrections to settle; from some on they are revised one by one.
-inline constexpr int kMostEffectCorrections = 16, kBulkEffectCorrections = 8;
+inline constexpr int kMostEffectCorrections = 24, kBulkEffectCorrections = 8;
 
 /// One bit a lane.
 using Lanes = std::uint32_t;
@@ -87,9 +87,13 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   static constexpr int W = L::count;
 
   explicit LaneStepper(const BlockSetup<Real>& setup)
-      : model_(setup.model), tree_(setup.model.tree), options_(setup.options), shared_constants_(setup.constants), alone_(model_, options_, setup.plan) {
+      : model_(setup.model), tree_(setup.model.tree), options_(setup.options), shared_constants_(setup.constants),
+        alone_(model_, options_, setup.plan) {
     if (setup.plan != nullptr && setup.plan->any()) effects_ = std::make_unique<EffectSweeps<Pack>>(*setup.plan, model_);
-    if (effects_) end_.allocate(tree_.shape.velocities);
+    if (effects_) {
+      end_.allocate(tree_.shape.velocities);
+      alone_contacts_.allocate(effects_->contacts());
+    }
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     kept_.allocate(shape);
@@ -129,7 +133,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   void step(const Block<Real>& block, std::int64_t steps) override {
     load(block);
     refresh();
-    if (effects_) load_contacts(block);
+    if (effects_) load_effects(block);
     Lanes alive = 0;
     for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
     for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = effects_ ? step_with_effects(block, alive) : step_once(block, alive);
@@ -205,7 +209,11 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   Pack refresh_effects() { return effect_potential_ = effects_->refresh(work_.placement, q_); }
 
-  void load_contacts(const Block<Real>& block) {
+  void load_effects(const Block<Real>& block) {
+    if (block.targets != nullptr) {
+      Field<Pack>& targets = effects_->servo_targets();
+      for (Index k = 0; k < targets.rows(); ++k) targets(k) = L::load(block.targets + k * W);
+    }
     if (block.contacts == nullptr) return;
     for (Index k = 0; k < effects_->contacts(); ++k) effects_->set_contact(k, L::load(block.contacts + k * W));
   }
@@ -430,6 +438,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     done &= ~lost;
 
     Lanes frozen = 0;
+    for (Pack& contact : alone_contacts_.flat()) contact = number(0);
     for (int l = 0; l < W; ++l) {
       if ((lost >> l & 1u) != 0 && !step_alone(block, l)) frozen |= 1u << l;
     }
@@ -438,7 +447,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     if (effects_) {
       if (effects_->plan().joints) effects_->end_joints(work_.delta, work_.motion, work_.innovation, end_);
       if (effects_->plan().bodies) effects_->end_bodies(work_.placement, work_.displacement, work_.impulse);
-      for (Index k = 0; k < effects_->contacts(); ++k) effects_->set_contact(k, select(moves, effects_->contact(k), number(0)));
+      for (Index k = 0; k < effects_->contacts(); ++k) {
+        effects_->set_contact(k, select(moves, effects_->contact(k), alone_contacts_(k)));
+      }
     }
     advance(moves);
     update_momentum(moves);
@@ -492,6 +503,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     take(q_, state.q.flat());
     take(p_, state.p.flat());
     if (has_applied_) take(applied_, alone_.applied());
+    if (effects_ && block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
     if constexpr (kOwnMasses) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
       for (Index i = 0; i < inertia.rows(); ++i) {
@@ -511,6 +523,22 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
   }
 
+  /// What the next step of lane l wants to know of one taken alone: its contacts and, where it was not split, its displacement.
+  void keep_alone(const Block<Real>& block, int l, bool whole) {
+    for (Index k = 0; k < alone_contacts_.rows(); ++k) set_lane(alone_contacts_(k), l, alone_.contact(k));
+    if (!whole) return;
+    constexpr int words = kHistoryWords<Real> * W;
+    std::array<std::int32_t, W> known;
+    known.fill(-1);
+    known[static_cast<std::size_t>(l)] = 0;
+    std::array<Real, W> delta{};
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
+      delta[static_cast<std::size_t>(l)] = static_cast<Real>(alone_.state().history(row, 0));
+      remember<W>(delta.data(), known.data(), block.past + row * words);
+    }
+    block.instances[l].displacements = 1;
+  }
+
   /// One instance with everything a Simulation can do. False where that fails too: it is frozen then.
   [[gnu::noinline]] bool step_alone(const Block<Real>& block, int l) {
     State<double>& state = alone_.state();
@@ -528,6 +556,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     instance.rescued += 1;
     instance.steps += 1;
     for (int k = 0; k < 2; ++k) block.pace[k * W + l] = static_cast<Real>(state.pace(0, k));
+    if (effects_) keep_alone(block, l, report.substeps == 1);
     for (Index row = 0; row < q_.rows(); ++row) set_lane(q_(row), l, state.q(row));
     for (Index row = 0; row < p_.rows(); ++row) set_lane(p_(row), l, state.p(row));
     return true;
@@ -545,8 +574,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Workspace<Pack> work_;
   Kept<Pack> kept_;
   Field<Pack> q_, p_, applied_;
-  std::unique_ptr<EffectSweeps<Pack>> effects_;  // null: none
+  EffectsPointer<Pack> effects_;
   Field<Pack> end_;                              // what effects add to p at the end of a step
+  Field<Pack> alone_contacts_;                   // of lanes that were stepped alone
   Pack effect_potential_ = Pack(Real(0));
   InstanceStepper alone_;
 };

@@ -59,7 +59,7 @@ Base base_from(const std::string& text) {
 Model load_model(const std::string& name, std::optional<Base> base) {
   if (is_scene(name)) {
     throw InputError(
-        fmt::format("{}: scenes are for linden run, rollout and inspect; expected a model here; give a URDF file or chain:3", name));
+        fmt::format("{}: scenes are for linden run, rollout, accuracy and inspect; expected a model here; give a URDF file or chain:3", name));
   }
   if (!is_generated(name)) return load_urdf(name, base.value_or(Base::fixed));
   if (base) throw InputError(fmt::format("--base is for URDF files; {} is generated, base and all: leave --base out", name));

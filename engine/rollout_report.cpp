@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "engine/effects_text.hpp"
 #include "engine/load_model.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -55,9 +56,15 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
   row("model", model_text(arguments, model));
   row("instances", fmt::format("{}, {} of {} kept", grouped(arguments.instances), memory_text(figures.bytes),
                                arguments.single ? "single precision" : "double precision"));
-  row("start", fmt::format("random positions and speeds, seeds {} to {}, spread {:g}", random->seed,
-                           random->seed + static_cast<std::uint64_t>(arguments.instances) - 1, random->spread));
-  if (const std::string left_out = LeftOut(model).text(); !left_out.empty()) row("ignored", left_out + "; rollouts know gravity only");
+  row("start", fmt::format("{}random positions and speeds, seeds {} to {}, spread {:g}", arguments.scene ? "as the scene says, with " : "",
+                           random->seed, random->seed + static_cast<std::uint64_t>(arguments.instances) - 1, random->spread));
+  const Effects effects = arguments.scene ? arguments.scene->effects : Effects();
+  std::string label = "effects";
+  for (const EffectLine& line : effect_lines(effects, model)) {
+    row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
+    label.clear();
+  }
+  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) row("ignored", left_out + "; a scene can name them");
   row("method", fmt::format("newton, step {:g} s, tolerance {:g} (energy), {}", options.step,
                             arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance,
                             gravity_text(options)));
@@ -75,8 +82,9 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                                   figures.summary.rescued > 0 && model.mimics.empty()
                                       ? fmt::format("; {} taken alone", counted(figures.summary.rescued, "step"))
                                       : ""));
+    // where effects give and take its change says nothing
     const EnergyChange energy(figures);
-    row("energy", fmt::format("changes by {:+.1e} of the kinetic energy in the mean, {:.1e} in the median, {:.1e} at most (instance {})",
+    if (effect_lines(effects, model).empty()) row("energy", fmt::format("changes by {:+.1e} of the kinetic energy in the mean, {:.1e} in the median, {:.1e} at most (instance {})",
                               energy.mean, energy.median, energy.most, grouped(energy.worst)));
   }
   if (figures.frames > 0) row("", printable(fmt::format("{}: {}", arguments.record, counted(figures.frames, "frame"))));

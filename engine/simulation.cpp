@@ -27,7 +27,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(checked(std::move(model), options, effects)), options_(options), plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
+    : model_(checked(std::move(model), options, effects)), options_(options), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
       stepper_(*model_, options, plan_.get()) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
@@ -98,6 +98,30 @@ void Simulation::set_forces(std::span<const double> force) {
   }
   stepper_.apply(force);
   stepper_.refresh(state_);
+}
+
+void Simulation::set_servo_targets(std::span<const double> targets) {
+  const std::span<double> to = stepper_.servo_targets();
+  check_row_count("servo targets", targets.size(), static_cast<Index>(to.size()));
+  for (std::size_t k = 0; k < targets.size(); ++k) {
+    if (!std::isfinite(targets[k])) throw InputError(fmt::format("the target of servo {} is {}", k, targets[k]));
+  }
+  std::ranges::copy(targets, to.begin());
+}
+
+void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, const std::array<double, 3>& moment) {
+  const auto wrench = std::ranges::find(plan_->effects.wrenches, slot, &BodyWrench::slot);
+  if (wrench == plan_->effects.wrenches.end()) {
+    const bool body = slot > 0 && slot < model_->tree.shape.slots;
+    throw InputError(fmt::format("no wrench acts on {}; expected one among the effects; name it there, zero if need be",
+                                 body ? fmt::format("body \"{}\"", model_->names.body[static_cast<std::size_t>(slot)])
+                                      : fmt::format("slot {}", slot)));
+  }
+  for (const double number : {force[0], force[1], force[2], moment[0], moment[1], moment[2]}) {
+    if (!std::isfinite(number)) throw InputError(fmt::format("the wrench on slot {} holds {}; expected finite numbers", slot, number));
+  }
+  wrench->force = force;
+  wrench->moment = moment;
 }
 
 StepReport Simulation::step() {

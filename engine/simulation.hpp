@@ -56,6 +56,14 @@ class Simulation {
   /// Conjugate to the velocities: of a ball or free joint moment, then force, in the body's frame.
   void set_forces(std::span<const double> force);
 
+  /// Targets of the servos [rad, m], in the order of Effects::servos, the same over every step until they are set anew. Throws InputError
+  /// for a wrong count or a number that is not finite.
+  void set_servo_targets(std::span<const double> targets);
+
+  /// The first wrench that the effects name on a body, from now on: force [N] and moment [N m] in the directions and at the point that it
+  /// was given with. Throws InputError where the effects name none on that body (one of zero will do) or a number is not finite.
+  void set_wrench(Index slot, const std::array<double, 3>& force, const std::array<double, 3>& moment);
+
   /// One step. A report that is not ok() leaves the state as it was before.
   StepReport step();
   std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
@@ -84,7 +92,7 @@ class Simulation {
 
   std::shared_ptr<const Model> model_;
   Options options_;
-  std::unique_ptr<const EffectPlan> plan_;
+  std::unique_ptr<EffectPlan> plan_;
   State<double> state_;
   Stepper stepper_;
   Field<double> rate_;

@@ -42,8 +42,8 @@ constexpr int kMostRevisions = 20, kLastRevision = 60;
 constexpr int kBulkRevisions = 5;
 
 /// Where they do not settle: speeds up to which friction is made smooth, one after the other [m/s, rad/s].
-constexpr double kSoftCreeps[] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
-constexpr int kMostSoftCorrections = 30;
+constexpr double kSoftCreeps[] = {1e-2, 1e-3, 1e-4, 1e-5};
+constexpr int kMostSoftCorrections = 40;
 
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
 constexpr double kSteepest = 0.5;
@@ -349,6 +349,11 @@ void Stepper::begin_effects(const State<double>& state, int history, double h) {
   known_ = history > 0;
 }
 
+std::span<double> Stepper::servo_targets() {
+  if (!effects_) return {};
+  return effects_->servo_targets().flat();
+}
+
 std::vector<std::span<double>> Stepper::effect_memory() {
   if (!effects_) return {};
   const auto memory = effects_->memory();
@@ -493,14 +498,16 @@ double Stepper::push() {
   return 0.5 * options_.step * options_.step * sum;
 }
 
-/// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so.
+/// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so;
+/// `whole`: until that has converged.
 ///
 /// With smooth friction the solution of the step minimises a function, convex but for the coupling of friction to the load it goes with,
 /// whose gradient is the residual; each correction is cut to where it falls no further. Its slope along a correction is r.(A^-1 r_before),
 /// the sum of u (d^-1 u_before): known from the passes.
 template <class Start>
-void Stepper::approach_softly(Evaluated& now, double& norm, const Start& start, StepReport& report) {
+void Stepper::approach_softly(Evaluated& now, double& norm, double h, bool whole, const Start& start, StepReport& report) {
   for (const double creep : kSoftCreeps) {
+    const bool to_the_end = whole && creep == std::end(kSoftCreeps)[-1];
     displacement_map(model_.tree, work_.motion, work_.delta);
     effects_->soften(creep, work_.delta);
     now = evaluate(report, start);
@@ -513,7 +520,7 @@ void Stepper::approach_softly(Evaluated& now, double& norm, const Start& start, 
         norm = factor_and_pass(now, report);
         continue;
       }
-      if (settled) break;
+      if (to_the_end ? converged(now, norm, h) || at_rounding_floor(now, norm, h, kFloorEpsilons) : settled) break;
       std::ranges::copy(work_.innovation.flat(), before_innovation_.flat().begin());
       const double slope_before = slope_along();
       now = solve_and_correct(report);
@@ -590,15 +597,17 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   const auto revised = [&](bool settled) {
     if (revises && one_pass_ && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
       // at first only to find the states; where they still do not settle the step stays with friction smooth below the least creep
-      approach_softly(now, norm, start, report);
-      if (revisions == kBulkRevisions) effects_->harden();
+      const bool whole = revisions == kMostRevisions;
+      approach_softly(now, norm, h, whole, start, report);
+      if (!whole) effects_->harden();
       revisions += 1;
       displacement_map(model_.tree, work_.motion, work_.delta);
       now = evaluate(report, start);
       norm = factor_and_pass(now, report);
       return fresh = true;
     }
-    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision || !revise_effects(settled, revisions >= kBulkRevisions)) return false;
+    if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision) return false;
+    if (!revise_effects(settled, revisions >= kBulkRevisions)) return false;
     revisions += 1;
     report.iterations += 1;
     now = evaluate(report, start);

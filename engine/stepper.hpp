@@ -56,6 +56,10 @@ class Stepper {
   /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
   /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
   StepReport step(State<double>& state, int& history, double time, double h);
+  /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; empty without servos.
+  std::span<double> servo_targets();
+  /// How contact point k ended the last step (EffectSweeps::contact).
+  double contact(Index k) const { return effects_->contact(k); }
   /// What effects keep from step to step beside the state: part of a checkpoint.
   std::vector<std::span<double>> effect_memory();
   /// Of effects, in the step taken last.
@@ -113,7 +117,7 @@ class Stepper {
   double fall(double h) const;
   double slope_along() const;
   template <class Start>
-  void approach_softly(Evaluated& now, double& norm, const Start& start, StepReport& report);
+  void approach_softly(Evaluated& now, double& norm, double h, bool whole, const Start& start, StepReport& report);
   const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
   double work(const Field<double>& force) const;
   bool at_rounding_floor(const Evaluated& now, double norm, double h, double epsilons) const;
@@ -139,7 +143,7 @@ class Stepper {
   double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
   double kinetic_ = 0;          // the same in J
   double failed_residual_ = 0;  // of the last solve that failed
-  std::unique_ptr<EffectSweeps<double>> effects_;  // null: none
+  EffectsPointer<double> effects_;
   EffectWork<double> effect_work_, solved_work_;  // of the whole step; of the root found last
   Field<double> before_;         // displacement of the step before, as far as it is known [rad, m]
   Field<double> before_innovation_, read_;

@@ -77,7 +77,8 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   add(points, {last, "find_ground", "pose", "points"});
   add(gravity, {last, "gravity_field_down", "placement", "field"});
   add(gravity, {last, "gravity_force_up", "inertia, subtree_mass, screw, placement, field", "first_moment, force"});
-  add(true, {last, "momentum_update_map", one_pass ? "screw, displacement, impulse, innovation, force" : "screw, displacement, impulse, residual, force", "p"});
+  const std::string_view left = one_pass ? "screw, displacement, impulse, innovation, force" : "screw, displacement, impulse, residual, force";
+  add(true, {last, "momentum_update_map", left, "p"});
   add(ties, {last, "fold_mimics", "p", "p"});
   return list;
 }

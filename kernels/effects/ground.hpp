@@ -12,11 +12,9 @@
 // gains nor loses. c' = c + (s - 1/2) h k.
 //
 // What sticks creeps by some kCreep at the limit of its friction and by less below it, the points of a foot in proportion to the load
-// that each bore at the beginning of the step. That is stiff, so it is taken by backward Euler (share 1), the normal force with the share s that its stiffness calls for
-// (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are revised within the solve until they are those of
-// the solution.
-//
-// Softly (creep > 0), as in friction.hpp: F_t = -friction N t / max(|t|, h creep).
+// that each bore at the beginning of the step. That is stiff, so it is taken by backward Euler (share 1), the normal force with the
+// share s that its stiffness calls for (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are revised
+// within the solve until they are those of the solution. Softly (creep > 0), as in friction.hpp: F_t = -friction N t / max(|t|, h creep).
 //
 // A rim of a cylinder stands as four points: the lowest of its circle, the highest, and the two between, found anew each step.
 //
@@ -97,7 +95,7 @@ LINDEN_INLINE GroundBelow<double> ground_below(const HeightField& field, double 
   const double u = std::clamp((x - field.origin_x) / field.spacing_x, 0.0, field.columns - 1.0);
   const double v = std::clamp((y - field.origin_y) / field.spacing_y, 0.0, field.rows - 1.0);
   const Index column = std::min(static_cast<Index>(u), field.columns - 2), row = std::min(static_cast<Index>(v), field.rows - 2);
-  const auto at = [&](Index c, Index r) { return field.heights[static_cast<std::size_t>(r) * static_cast<std::size_t>(field.columns) + static_cast<std::size_t>(c)]; };
+  const auto at = [&](Index c, Index r) { return field.heights[static_cast<std::size_t>(r * field.columns + c)]; };
   const double a = u - column, b = v - row;
   const double h00 = at(column, row), h10 = at(column + 1, row), h01 = at(column, row + 1), h11 = at(column + 1, row + 1);
   // two triangles a cell

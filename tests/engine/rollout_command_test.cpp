@@ -50,6 +50,20 @@ TEST_CASE("equal rollouts write equal files, whatever the threads, and other see
   }
 }
 
+TEST_CASE("a rollout of a scene takes its effects and its duration, and starts around its own start", "[command line]") {
+  const Shell shell;
+  shell.write("link.yaml", "model: chain:1\nduration: 0.5\ninitial: {positions: {joint1: 1}}\neffects: {damping: 1, servo: {stiffness: 4}}\n");
+  REQUIRE(shell.linden("rollout link.yaml --instances 3 --every 500 --record a.npz --json a.json").exit_code == 0);
+  const nlohmann::json figures = json_of(shell / "a.json");
+  CHECK(figures["steps"] == 500);
+  CHECK(figures["frames"] == 2);
+  CHECK(figures["failures"] == 0);
+  // without gravity and with a servo towards the start itself nothing moves but what was random
+  CHECK(figures["energy_change_most"] > 0);
+  REQUIRE(shell.linden("rollout link.yaml --instances 3 --spread 0 --json b.json").exit_code == 0);
+  CHECK(json_of(shell / "b.json")["energy_change_most"] == 0);
+}
+
 TEST_CASE("a rollout of hundreds of short frames, or of nothing but frozen instances, ends", "[command line]") {
   const Shell shell;
   REQUIRE(shell.linden("rollout chain:2 --instances 2 --duration 0.3 --record a.npz --json a.json", "timeout 60").exit_code == 0);

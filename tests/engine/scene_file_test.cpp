@@ -867,6 +867,6 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[scene][command 
     check_refused(shell, std::string(command) + "none.yaml", "none.yaml: there is no such file");
     check_refused(shell, std::string(command) + "a.yaml --json a.yaml", "expected .json");
   }
-  check_refused(shell, "rollout a.yaml", "scenes are for linden run and linden inspect");
+  check_refused(shell, "rollout a.yaml --base floating", "leave --base out");
   check_refused(shell, "run a.yaml --spread -1", "--spread");
 }
