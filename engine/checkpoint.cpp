@@ -1,7 +1,7 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
 //   "linden checkpoint 2\n"
-//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order (little endian, as laid out below)
+//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of effects' numbers (little endian, as laid out below)
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
 //   of every sub-step but the first: valid rows of its history, its history
 //   what effects keep from step to step, 8 bytes a number
@@ -31,8 +31,9 @@ struct Header {
   std::int64_t steps;
   std::int64_t history;
   std::int64_t order;
+  std::int64_t effects;  // numbers that effects keep
 };
-static_assert(sizeof(Header) == 80, "a checkpoint's header has no padding");
+static_assert(sizeof(Header) == 88, "a checkpoint's header has no padding");
 
 std::uint64_t checksum(std::string_view bytes) {
   std::uint64_t state = 14695981039346656037ull;
@@ -45,6 +46,12 @@ void append(std::string& bytes, const T* values, std::size_t count) {
   bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
 }
 
+std::int64_t count_of(const std::vector<std::span<double>>& memory) {
+  std::size_t count = 0;
+  for (const std::span<double> numbers : memory) count += numbers.size();
+  return static_cast<std::int64_t>(count);
+}
+
 }  // namespace
 
 void Simulation::save(const std::string& file) {
@@ -55,7 +62,8 @@ void Simulation::save(const std::string& file) {
                       model_->tree.shape.velocities,
                       steps_,
                       history_,
-                      options_.order};
+                      options_.order,
+                      count_of(stepper_.effect_memory())};
   std::string bytes(kMagic);
   append(bytes, &header, 1);
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
@@ -96,6 +104,12 @@ void Simulation::load(const std::string& file) {
                                  "same run",
                                  file, header.order, options_.order));
   }
+  const std::vector<std::span<double>> memory = stepper_.effect_memory();
+  if (header.effects != count_of(memory)) {
+    throw InputError(fmt::format("{}: this checkpoint was made with other effects than the simulation has, so it would not continue the "
+                                 "same run; load it with the scene that it was made with",
+                                 file));
+  }
   if (header.step != options_.step || !std::equal(std::begin(header.gravity), std::end(header.gravity), options_.gravity.begin())) {
     throw InputError(fmt::format("{}: this checkpoint was made with a step of {} s and gravity {} {} {}; the simulation has {} s and {} "
                                  "{} {}, so it would not continue the same run",
@@ -106,7 +120,6 @@ void Simulation::load(const std::string& file) {
   State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) { expected += field.bytes(); });
   std::vector<Past> past = past_;
   for (const Past& one : past) expected += sizeof(std::int64_t) + one.history.bytes();
-  const std::vector<std::span<double>> memory = stepper_.effect_memory();
   for (const std::span<double> numbers : memory) expected += numbers.size_bytes();
   std::uint64_t sum = 0;
   std::memcpy(&sum, bytes.data() + bytes.size() - sizeof(sum), sizeof(sum));

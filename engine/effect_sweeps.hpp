@@ -216,7 +216,6 @@ class EffectSweeps {
 
   /// What the next step wants to know of this one: where contact points stick and how they moved, and what velocities are read with.
   auto memory() {
-    known_ = true;
     return std::array{points_.closed.flat(), points_.slides.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
                       bodies_.last.flat(), bodies_.even.flat(), last_.flat(), even_.flat()};
   }
@@ -248,23 +247,23 @@ class EffectSweeps {
 
   /// Impulses of the beginning become those of the end, but for being seen from the new poses.
   void end_bodies(const Field<S, 12>& placement, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    const S rate = S(1.0) / h_;
     for (const TouchedBody& body : plan_.touched) {
       const auto D = load<Displacement, S>(displacement, body.slot);
       store(bodies_.uneven, body.slot, carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
       for (int k = 0; k < 6; ++k) {
-        const S& uneven = bodies_.uneven(body.slot, k);
+        const S uneven = rate * bodies_.uneven(body.slot, k);
         bodies_.even(body.slot, k) = lasting(uneven, bodies_.last(body.slot, k));
         bodies_.last(body.slot, k) = uneven;
       }
     }
     add_given_up(tree_, placement, bodies_.given, impulse);
     keep_ground(points_);
-    known_ = true;
   }
 
   /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
   void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) {
-    const S half(0.5);
+    const S half(0.5), rate = S(1.0) / h_;
     joint_impulses_end_map(sum_, h_, delta, end);
     if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
     const S most = as<S>(std::numeric_limits<typename ElementOf<S>::type>::max()), zero(0.0);
@@ -275,29 +274,33 @@ class EffectSweeps {
       // the step that comes to rest is an impact
       uneven = select(held, select(delta(row) == zero, uneven + half * residual(row), zero), uneven);
       residual(row) = select(held, zero, residual(row));
+      uneven = rate * uneven;
       even_(row) = lasting(uneven, last_(row));
       last_(row) = uneven;
     }
-    known_ = true;
   }
 
   /// p with the impulses of the last step taken half at each of its ends: what velocities are read from.
   template <class Element>
   void even_out(const BodyConstants<Element>& constants, const Field<S, 12>& placement, Field<S, 6>& scratch, Field<S>& projected,
                 Field<S>& p) const {
-    if (!known_ || h_ == S(0.0)) return;
-    const S rate = S(1.0) / h_;
     if (plan_.bodies) {
       std::ranges::copy(bodies_.even.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
-      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + rate * projected(row);
+      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + projected(row);
     }
     if (plan_.joints) {
-      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + rate * even_(row);
+      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + even_(row);
     }
   }
   /// The state is another's from now on.
-  void forget() { known_ = false; }
+  void forget() {
+    const auto clear = [](auto& field) { std::ranges::fill(field.flat(), S(0.0)); };
+    clear(last_);
+    clear(even_);
+    clear(bodies_.last);
+    clear(bodies_.even);
+  }
 
   /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
   /// last step; `known`: it was one of these sweeps.
@@ -349,7 +352,6 @@ class EffectSweeps {
   const Tree& tree_;
   S h_{};
   double creep_ = 0;
-  bool known_ = false;   // the last step was one of these sweeps
   Field<S> last_, even_;  // of joints, as BodyImpulses has them of bodies
   const Field<S>* q_ = nullptr;
   Field<S> rotors_;

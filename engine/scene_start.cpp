@@ -74,7 +74,7 @@ class Start {
               fmt::format("name its leader \"{}\"", model_.names.joint[static_cast<std::size_t>(mimic.leader_slot)]));
     }
     switch (tree.kind(slot)) {
-      case JointKind::screw: put(velocity, velocity ? tree.first_v(slot) : tree.first_q(slot), {{at.number()}}); break;
+      case JointKind::screw: put(velocity, velocity ? tree.first_v(slot) : tree.first_q(slot), {at.number()}); break;
       case JointKind::ball:
         if (velocity) {
           put(true, tree.first_v(slot), at.numbers(3, "three numbers, the angular velocity in the body's frame"));

@@ -30,8 +30,8 @@ namespace linden {
   FIELD(Scalar, pose, 12, slots, "T: body -> world at q; rotation row by row, shift [m]")                \
   FIELD(Scalar, given, 6, slots, "h x impulses of both ends, body frame at k; moment, force")            \
   FIELD(Scalar, uneven, 6, slots, "h x impulses of the beginning less half of both ends, likewise")      \
-  FIELD(Scalar, last, 6, slots, "uneven of the last step")                                               \
-  FIELD(Scalar, even, 6, slots, "what lasted of uneven: what velocities are read with")                  \
+  FIELD(Scalar, last, 6, slots, "uneven impulse of the last step")                                       \
+  FIELD(Scalar, even, 6, slots, "what lasted of it: what velocities are read with")                      \
   FIELD(Scalar, pull, 36, slots, "what K grows by, as a Mat6; zero of bodies that no effect touches")
 
 template <class Scalar>

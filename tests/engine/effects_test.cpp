@@ -530,6 +530,8 @@ TEST_CASE("a run of effects that goes on from a checkpoint is the run that went 
   CHECK(std::ranges::equal(one.positions(), other.positions()));
   CHECK(std::ranges::equal(one.momenta(), other.momenta()));
   CHECK(one.velocities() == other.velocities());
+  Simulation without(scene.model, scene.options);
+  CHECK_THROWS_WITH(without.load(folder.file("a.checkpoint")), Catch::Contains("other effects"));
 }
 
 TEST_CASE("conservative effects leave no slope in the energy over 100,000 steps, damping's account closes", "[effects]") {
