@@ -14,6 +14,8 @@
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
 //
+// Effects act as in a Simulation, on lanes and threads alike; servo targets and forces may differ from instance to instance.
+//
 // Models with mimic joints are stepped an instance at a time, on all threads but without lanes.
 #pragma once
 
@@ -114,7 +116,8 @@ class BatchOf {
 
   BatchView<const Real> positions() const;
   BatchView<const Real> momenta() const;
-  /// v = M(q)^-1 p and energy (kinetic, potential [J]) of all instances, computed at every call.
+  /// v = M(q)^-1 p and energy (kinetic, potential [J]) of all instances, computed at every call. Where stiff effects hold a weight, v is off by
+  /// up to half of what the weight gives in a step; a Simulation evens that out (kernels/effects/body_impulses.hpp).
   struct Observation {
     std::vector<Real> velocity_numbers, energy_numbers;
     Index nv;
