@@ -38,13 +38,12 @@ AccuracySetup setup_of(const AccuracyArguments& arguments) {
   setup.options = arguments.options;
   setup.duration = arguments.duration;
   setup.budget = arguments.budget;
+  setup.model = arguments.loaded();
+  setup.effects = arguments.effects();
   if (arguments.scene) {
-    setup.model = {arguments.scene, &arguments.scene->model};
-    setup.effects = arguments.scene->effects;
     setup.start = arguments.scene->initial;
-  } else {
-    setup.model = std::make_shared<const Model>(load_model(arguments.model, arguments.base));
-    if (const auto random = randomness(arguments)) setup.start = random_state(*setup.model, random->seed, random->spread);
+  } else if (const auto random = randomness(arguments)) {
+    setup.start = random_state(*setup.model, random->seed, random->spread);
   }
   return setup;
 }

@@ -2,19 +2,16 @@
 // `linden accuracy`: what accuracy costs on a person's own scene, and which method and step to take (engine/accuracy.hpp).
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "engine/motion_arguments.hpp"
-#include "engine/scene.hpp"
 
 namespace linden {
 
 struct AccuracyArguments : MotionArguments {
-  Options options;                     // step: in the middle of those that are tried
-  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
-  double budget = 60;                  // [s]
-  std::string json, plot;              // files; empty = none
+  Options options;         // step: in the middle of those that are tried
+  double budget = 60;      // [s]
+  std::string json, plot;  // files; empty = none
 };
 
 /// Returns the exit code: 0, 1 where no reference was found, every run failed or a file could not be written, 130 after Ctrl-C.

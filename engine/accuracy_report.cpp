@@ -19,14 +19,6 @@ std::string milliseconds(double seconds) { return fmt::format("{:.4g}", 1e3 * se
 /// "1.3e-05", "-" where nothing is known.
 std::string short_number(double value) { return std::isfinite(value) ? fmt::format("{:.1e}", value) : "-"; }
 
-std::string start_text(const AccuracyArguments& arguments) {
-  if (const auto random = randomness(arguments)) {
-    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "",
-                       random->seed, random->spread);
-  }
-  return arguments.scene ? "as the scene says" : "at rest in the zero configuration";
-}
-
 std::string reference_text(const AccuracyFigures& figures) {
   const AccuracyReference& reference = figures.reference;
   if (!reference.failure.empty()) return reference.failure;

@@ -43,11 +43,10 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
     : model_(std::move(model)),
       scheme_(scheme),
       options_(options),
-      effects_(effects),
       gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
+      plan_(*model_, options, effects),
       ties_(model_->mimics, model_->tree.shape.velocities) {
   check(options);
-  check(effects, *model_);
   if (const std::string refused = irreversible(effects); !refused.empty()) {
     throw InputError(fmt::format("{} knows gravity, armature and springs alone; the scene has {}", name(scheme), refused));
   }
@@ -55,14 +54,6 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
   for (Field<double>* field : {&q_, &good_q_}) field->allocate(shape.positions);
   for (Field<double>* field : {&v_, &good_v_, &stage_u_, &stage_v_, &rate_u_, &rate_v_, &sum_u_, &sum_v_})
     field->allocate(shape.velocities);
-  if (!effects_.armature.empty()) {
-    rotor_.allocate(shape.velocities);
-    for (const Armature& one : effects_.armature) rotor_(one.row) += one.inertia;
-  }
-  if (!effects_.springs.empty()) {
-    q_row_.allocate(shape.velocities);
-    for (Index i = 1; i < shape.slots; ++i) q_row_(model_->tree.first_v(i)) = model_->tree.first_q(i);
-  }
   work_.allocate(shape);
   std::ranges::copy(model_->neutral(), q_.flat().begin());
 }
@@ -89,12 +80,12 @@ void Baseline::place() {
   } else {
     std::ranges::fill(work_.force.flat(), 0.0);
   }
-  for (const JointSpring& spring : effects_.springs) {
-    const double stretch = q_(q_row_(spring.row)) - spring.rest;
+  for (const JointSpring& spring : plan_.effects.springs) {
+    const double stretch = q_(plan_.q_row(spring.row)) - spring.rest;
     work_.force(spring.row) -= spring.stiffness * stretch;
     potential_ += 0.5 * spring.stiffness * stretch * stretch;
   }
-  for (const BallSpring& spring : effects_.ball_springs) {
+  for (const BallSpring& spring : plan_.effects.ball_springs) {
     const Index from = tree.first_q(spring.slot), row = tree.first_v(spring.slot);
     const Vec3<double> turn =
         shorter_turn(rest_inverse<double>(spring) * Quaternion<double>{load3<double>(q_, from), q_(from + 3)});
@@ -115,9 +106,9 @@ void Baseline::accelerate(const Field<double>& v, Field<double>& a) {
   fold_mimics(ties_.mimics(), work_.residual);
 
   const Gains<double> gains{work_.gain_up, work_.gain_down, work_.joint_inverse};
-  if (rotor_.rows() > 0) {
+  if (plan_.rotor.rows() > 0) {
     articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains,
-                           EffectsAdded<double, true, false>{rotor_, none_});
+                           EffectsAdded<double, true, false>{plan_.rotor, none_});
   } else {
     articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains);
   }
@@ -206,7 +197,7 @@ void Baseline::find_momentum(const Field<double>& v) {
   velocity_down(tree, model_->constants, work_.placement, v, work_.twist);
   momentum_of_map(tree, model_->constants, work_.twist, work_.impulse);
   impulse_up(tree, model_->constants, work_.placement, work_.impulse, work_.residual);
-  add_armature<double>(effects_.armature, v, work_.residual);
+  add_armature<double>(plan_.effects.armature, v, work_.residual);
 }
 
 Energy Baseline::energy() {

@@ -19,10 +19,10 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/effect_plan.hpp"
 #include "engine/options.hpp"
 #include "engine/simulation.hpp"
 #include "kernels/mimic.hpp"
-#include "layout/effects.hpp"
 #include "layout/workspace.hpp"
 
 namespace linden {
@@ -68,14 +68,12 @@ class Baseline {
   std::shared_ptr<const Model> model_;
   Scheme scheme_;
   Options options_;
-  Effects effects_;
   bool gravity_;
+  EffectPlan plan_;
   double potential_ = 0;
   std::int64_t steps_ = 0, evaluations_ = 0;
   Field<double> q_, v_, good_q_, good_v_;
   Field<double> stage_u_, stage_v_, rate_u_, rate_v_, sum_u_, sum_v_;
-  Field<double> rotor_;     // armature of every row
-  Field<Index> q_row_;      // position row of a screw's velocity row, where there are springs
   Field<double, 36> none_;  // no pull on any body
   Workspace<double> work_;
   MimicTies<double> ties_;

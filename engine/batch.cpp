@@ -195,7 +195,6 @@ BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& optio
 template <class Real>
 BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options, const Effects& effects) {
   check_batch(size, options);
-  check(effects, *model);
   data_ = std::make_unique<Data>(std::move(model), size, options, effects);
 }
 

@@ -64,6 +64,7 @@ double share_at(const BodyWrench& wrench, double time) {
 }
 
 EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
+  check(effects, model);
   const double h = options.step;
   const Tree& tree = model.tree;
   std::ranges::stable_sort(effects.drag, {}, &Drag::slot);

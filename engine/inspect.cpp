@@ -117,8 +117,6 @@ Index widest_level(const Tree& tree) {
   return widest;
 }
 
-Effects effects_of(const InspectArguments& arguments) { return arguments.scene ? arguments.scene->effects : Effects(); }
-
 class Printer {
  public:
   Printer(const InspectArguments& arguments, const Model& model, std::vector<EffectCost> costs)
@@ -256,7 +254,7 @@ class Printer {
     fmt::print("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
     Table table({{"when", Align::left}, {"sweep", Align::left}, {"reads", Align::left}, {"writes", Align::left}}, kLineWidth);
     std::string_view before;
-    for (const Sweep& sweep : sweeps_of(model_, arguments_.options, effects_of(arguments_))) {
+    for (const Sweep& sweep : sweeps_of(model_, arguments_.options, EffectPlan(model_, arguments_.options, arguments_.effects()))) {
       table.add({std::string(sweep.when == before ? "" : sweep.when), std::string(sweep.name), std::string(sweep.reads),
                  std::string(sweep.writes)});
       before = sweep.when;
@@ -335,7 +333,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const std::v
                       {"offset", mimic.offset}});
   }
   Json& sweeps = result["sweeps"] = Json::array();
-  for (const Sweep& sweep : sweeps_of(model, arguments.options, effects_of(arguments))) {
+  for (const Sweep& sweep : sweeps_of(model, arguments.options, EffectPlan(model, arguments.options, arguments.effects()))) {
     sweeps.push_back({{"when", sweep.when}, {"name", sweep.name}, {"reads", sweep.reads}, {"writes", sweep.writes}});
   }
   if (arguments.scene) {
@@ -357,8 +355,8 @@ int inspect(const InspectArguments& arguments) {
   check(arguments.options);
   if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
   if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
-  const Model loaded = arguments.scene ? Model() : load_model(arguments.model, arguments.base);
-  const Model& model = arguments.scene ? arguments.scene->model : loaded;
+  const std::shared_ptr<const Model> loaded = arguments.loaded();
+  const Model& model = *loaded;
   const std::vector<EffectCost> costs = arguments.scene ? effect_costs(*arguments.scene) : std::vector<EffectCost>();
   if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs));
   Printer(arguments, model, costs).print();

@@ -8,20 +8,13 @@
 //   sweeps       of one step in order, with what each reads and writes
 #pragma once
 
-#include <memory>
-#include <optional>
 #include <string>
 
-#include "engine/options.hpp"
-#include "engine/scene.hpp"
-#include "layout/urdf.hpp"
+#include "engine/motion_arguments.hpp"
 
 namespace linden {
 
-struct InspectArguments {
-  std::string model;
-  std::optional<Base> base;
-  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
+struct InspectArguments : ModelArguments {
   Options options;    // gravity and solver decide which sweeps there are
   bool all = false;   // print long tables whole
   std::string json;   // file; empty = none

@@ -14,6 +14,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "engine/accuracy_command.hpp"
@@ -71,25 +72,29 @@ void read_motion_options(const Texts& texts, MotionArguments& motion, Options& o
   if (!texts.spread.empty()) motion.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
 }
 
-/// Loads the scene that `model` names; null where it names a model. What the command line says of its start goes over the scene's.
-std::shared_ptr<const Scene> scene_named(const std::string& model, const std::optional<Base>& base, const SceneStart& start) {
-  if (!is_scene(model)) return nullptr;
-  if (base) throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", model));
-  if (start.spread) check_spread(*start.spread);
-  return std::make_shared<const Scene>(load_scene(model, start));
+/// What `read` takes from the command line goes over the scene that the arguments name, if they name one.
+template <class Arguments, class Read>
+void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
+  read();
+  if (!is_scene(arguments.model)) return;
+  if (arguments.base) {
+    throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", arguments.model));
+  }
+  SceneStart start;
+  if constexpr (std::is_base_of_v<MotionArguments, Arguments> && !std::is_same_v<Arguments, RolloutArguments>) {
+    if (arguments.spread) check_spread(*arguments.spread);
+    start = {arguments.seed, arguments.spread};
+  }
+  arguments.scene = std::make_shared<const Scene>(load_scene(arguments.model, start));
+  options = arguments.scene->options;
+  if constexpr (std::is_base_of_v<MotionArguments, Arguments>) arguments.duration = arguments.scene->duration;
+  read();
 }
 
 void read_run_options(const Texts& texts, RunArguments& run) {
-  read_motion_options(texts, run, run.options);
+  read_over_scene(run, run.options, [&] { read_motion_options(texts, run, run.options); });
   if (!run.load.empty() && randomness(run)) {
     throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
-  }
-  run.scene = scene_named(run.model, run.base, {run.seed, run.spread});
-  if (run.scene) {
-    run.options = run.scene->options;
-    run.duration = run.scene->duration;
-    // what the command line says goes over the scene
-    read_motion_options(texts, run, run.options);
   }
   if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
   if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
@@ -105,13 +110,7 @@ void read_run_options(const Texts& texts, RunArguments& run) {
 }
 
 void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
-  read_motion_options(texts, rollout, rollout.options);
-  rollout.scene = scene_named(rollout.model, rollout.base, {});
-  if (rollout.scene) {
-    static_cast<Options&>(rollout.options) = rollout.scene->options;
-    rollout.duration = rollout.scene->duration;
-    read_motion_options(texts, rollout, rollout.options);
-  }
+  read_over_scene(rollout, rollout.options, [&] { read_motion_options(texts, rollout, rollout.options); });
   if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
   if (!texts.every.empty()) rollout.every = integer_from("--every", texts.every, "steps between frames, such as 10");
   if (!texts.threads.empty()) {
@@ -139,23 +138,12 @@ void read_scaling_options(const Texts& texts, ScalingArguments& scaling) {
 }
 
 void read_accuracy_options(const Texts& texts, AccuracyArguments& accuracy) {
-  read_motion_options(texts, accuracy, accuracy.options);
-  accuracy.scene = scene_named(accuracy.model, accuracy.base, {accuracy.seed, accuracy.spread});
-  if (accuracy.scene) {
-    accuracy.options = accuracy.scene->options;
-    accuracy.duration = accuracy.scene->duration;
-    read_motion_options(texts, accuracy, accuracy.options);
-  }
+  read_over_scene(accuracy, accuracy.options, [&] { read_motion_options(texts, accuracy, accuracy.options); });
   if (!texts.budget.empty()) accuracy.budget = number_from("--budget", texts.budget, "seconds, such as 60");
 }
 
 void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
-  read_model_options(texts, inspect.base, inspect.options);
-  inspect.scene = scene_named(inspect.model, inspect.base, {});
-  if (inspect.scene) {
-    inspect.options = inspect.scene->options;
-    read_model_options(texts, inspect.base, inspect.options);
-  }
+  read_over_scene(inspect, inspect.options, [&] { read_model_options(texts, inspect.base, inspect.options); });
   if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
 }
 

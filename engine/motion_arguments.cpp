@@ -17,9 +17,22 @@ constexpr double kMostSteps = 1e12;
 
 }  // namespace
 
+std::shared_ptr<const Model> ModelArguments::loaded() const {
+  if (scene) return {scene, &scene->model};
+  return std::make_shared<const Model>(load_model(model, base));
+}
+
 std::optional<Randomness> randomness(const MotionArguments& arguments) {
   if (!arguments.seed && !arguments.spread) return std::nullopt;
   return Randomness{arguments.seed.value_or(kDefaultSeed), arguments.spread.value_or(kDefaultSpread)};
+}
+
+std::string start_text(const MotionArguments& arguments) {
+  if (const auto random = randomness(arguments)) {
+    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "",
+                       random->seed, random->spread);
+  }
+  return arguments.scene ? "as the scene says" : "at rest in the zero configuration";
 }
 
 void check_spread(double spread) {
@@ -41,7 +54,7 @@ std::int64_t step_count(const MotionArguments& arguments, double step) {
   return std::llround(duration / step);
 }
 
-std::string model_text(const MotionArguments& arguments, const Model& model) {
+std::string model_text(const ModelArguments& arguments, const Model& model) {
   const std::string name = model.names.model.starts_with(arguments.model)
                                ? printable(model.names.model)
                                : printable(fmt::format("{} ({})", model.names.model, arguments.model));

@@ -52,7 +52,7 @@ class Execution {
  public:
   Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
       : arguments_(arguments),
-        batch_(std::move(model), arguments.instances, arguments.options, arguments.scene ? arguments.scene->effects : Effects()) {
+        batch_(std::move(model), arguments.instances, arguments.options, arguments.effects()) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
@@ -195,7 +195,7 @@ int rollout_command(const RolloutArguments& given) {
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   check_arguments(arguments);
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
-  const auto model = std::make_shared<const Model>(arguments.scene ? arguments.scene->model : load_model(arguments.model, arguments.base));
+  const std::shared_ptr<const Model> model = arguments.loaded();
   print_warnings(*model);
   return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
 }

@@ -8,17 +8,14 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 
 #include "engine/batch.hpp"
-#include "engine/scene.hpp"
 #include "engine/motion_arguments.hpp"
 
 namespace linden {
 
 struct RolloutArguments : MotionArguments {
-  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
   BatchOptions options;
   std::int64_t instances = 1024;
   bool single = false;      // float instead of double

@@ -58,7 +58,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                                arguments.single ? "single precision" : "double precision"));
   row("start", fmt::format("{}random positions and speeds, seeds {} to {}, spread {:g}", arguments.scene ? "as the scene says, with " : "",
                            random->seed, random->seed + static_cast<std::uint64_t>(arguments.instances) - 1, random->spread));
-  const Effects effects = arguments.scene ? arguments.scene->effects : Effects();
+  const Effects effects = arguments.effects();
   std::string label = "effects";
   for (const EffectLine& line : effect_lines(effects, model)) {
     row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));

@@ -63,11 +63,6 @@ void check_outputs(const RunArguments& arguments) {
   }
 }
 
-std::shared_ptr<const Model> model_of(const RunArguments& arguments) {
-  if (arguments.scene) return {arguments.scene, &arguments.scene->model};
-  return std::make_shared<const Model>(load_model(arguments.model, arguments.base));
-}
-
 /// Puts the simulation where the run is to begin.
 void begin_run(const RunArguments& arguments, Simulation& simulation) {
   if (!arguments.load.empty()) return simulation.load(arguments.load);
@@ -83,8 +78,7 @@ void begin_run(const RunArguments& arguments, Simulation& simulation) {
 
 /// Whether an effect takes momentum out of the system or brings it in.
 bool acts_from_outside(const RunArguments& arguments) {
-  if (!arguments.scene) return false;
-  const Effects& effects = arguments.scene->effects;
+  const Effects effects = arguments.effects();
   return !effects.wrenches.empty() || !effects.drag.empty() || effects.ground;
 }
 
@@ -214,9 +208,9 @@ int run_command(const RunArguments& arguments) {
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   check_outputs(arguments);
 
-  const std::shared_ptr<const Model> model = model_of(arguments);
+  const std::shared_ptr<const Model> model = arguments.loaded();
   print_warnings(*model);
-  Simulation simulation(model, arguments.options, arguments.scene ? arguments.scene->effects : Effects());
+  Simulation simulation(model, arguments.options, arguments.effects());
   begin_run(arguments, simulation);
 
   Execution run(arguments, simulation, steps);

@@ -7,17 +7,14 @@
 //   writes    files appear whole or not at all. A run that fails or is interrupted leaves them valid up to its last good step.
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "engine/motion_arguments.hpp"
-#include "engine/scene.hpp"
 
 namespace linden {
 
 struct RunArguments : MotionArguments {
   Options options;
-  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model. options and duration go over the scene's
   std::string record, json, plot, save, load;  // files; empty = none
 };
 

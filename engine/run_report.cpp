@@ -15,16 +15,8 @@
 namespace linden {
 namespace {
 
-Effects effects_of(const RunArguments& arguments) { return arguments.scene ? arguments.scene->effects : Effects(); }
-
-std::string start_text(const RunArguments& arguments, const RunFigures& figures) {
-  if (!arguments.load.empty()) return fmt::format("{}, at {:.6g} s", arguments.load, figures.begin);
-  if (const auto random = randomness(arguments)) {
-    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "",
-                       random->seed, random->spread);
-  }
-  if (arguments.scene) return "as the scene says";
-  return "at rest in the zero configuration";
+std::string begin_text(const RunArguments& arguments, const RunFigures& figures) {
+  return arguments.load.empty() ? start_text(arguments) : fmt::format("{}, at {:.6g} s", arguments.load, figures.begin);
 }
 
 double mean(std::int64_t sum, std::int64_t count) { return static_cast<double>(sum) / static_cast<double>(count); }
@@ -59,8 +51,8 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   const auto row = [&](const char* label, const std::string& value) { text += fmt::format("{:<11} {}\n", label, value); };
 
   row("model", model_text(arguments, model));
-  row("start", start_text(arguments, figures));
-  const Effects effects = effects_of(arguments);
+  row("start", begin_text(arguments, figures));
+  const Effects effects = arguments.effects();
   std::string label = "effects";
   for (const EffectLine& line : effect_lines(effects, model)) {
     row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
@@ -131,7 +123,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
   using Json = nlohmann::ordered_json;
   const auto if_any = [](bool any, double value) { return any && std::isfinite(value) ? Json(value) : Json(nullptr); };
   const auto if_given = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
-  const Effects effects = effects_of(arguments);
+  const Effects effects = arguments.effects();
   const LeftOut left_out(model, effects);
   Json effect_list = Json::array();
   for (const EffectLine& line : effect_lines(effects, model)) {
@@ -215,10 +207,10 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
   chart.title = fmt::format("Energy drift of {}", printable(simulation.model().names.model));
   chart.subtitle = fmt::format("{}, {}; {}, {}step {:g} s, {}, {}; start {}; H(0) = {:.6g} J",
                                counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
-                               order_text(options), options.step, counted(figures.steps, "step"), gravity_text(options), start_text(arguments, figures),
+                               order_text(options), options.step, counted(figures.steps, "step"), gravity_text(options), begin_text(arguments, figures),
                                energy.initial());
   chart.x.label = "time [s]";
-  const bool effects = !effect_lines(effects_of(arguments), simulation.model()).empty();
+  const bool effects = !effect_lines(arguments.effects(), simulation.model()).empty();
   const char* drift = effects ? "H \u2212 H(0) \u2212 work of effects" : "H \u2212 H(0)";
   chart.y.label = scaled ? fmt::format("{}, share of the largest kinetic energy ({:.4g} J)", drift, energy.scale())
                          : fmt::format("{} [J]", drift);

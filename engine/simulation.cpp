@@ -15,10 +15,9 @@ namespace linden {
 
 namespace {
 
-std::shared_ptr<const Model> checked(std::shared_ptr<const Model> model, const Options& options, const Effects& effects) {
-  check(effects, *model);
+const Options& checked(const Options& options, const Effects& effects) {
   check_order(options.order, effects);
-  return model;
+  return options;
 }
 
 }  // namespace
@@ -27,7 +26,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(checked(std::move(model), options, effects)), options_(options), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
+    : model_(std::move(model)), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
       stepper_(*model_, options, plan_.get()) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);

@@ -5,13 +5,10 @@
 
 namespace linden {
 
-std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const Effects& effects) {
-  const bool points = effects.ground && !effects.ground->contacts.empty();
-  const bool bodies = points || !effects.drag.empty() || !effects.wrenches.empty();
+std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const EffectPlan& plan) {
+  const Effects& effects = plan.effects;
+  const bool joints = plan.joints, bodies = plan.bodies, points = !plan.ground.points.empty();
   const bool limited = std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
-  const bool held = !effects.friction.empty() || !effects.limits.empty();
-  const bool joints = held || !effects.armature.empty() || !effects.springs.empty() || !effects.ball_springs.empty() ||
-                      !effects.damping.empty() || !effects.servos.empty() || !effects.torques.empty();
   const bool gravity = options.gravity != std::array<double, 3>{0, 0, 0};
   const bool newton = options.solver == Solver::newton;
   const bool ties = !model.mimics.empty();

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/effect_plan.hpp"
 #include "engine/options.hpp"
-#include "layout/effects.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
@@ -18,6 +18,6 @@ struct Sweep {
 };
 
 /// Those of this model and these options: what a scene does not have is not in the list.
-std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const Effects& effects = {});
+std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const EffectPlan& plan);
 
 }  // namespace linden

@@ -21,13 +21,14 @@ std::multiset<std::string> names_of(const std::vector<Sweep>& sweeps) {
 TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no others") {
   const Model model = chain(3);
   const Options options;
-  const auto plain = names_of(sweeps_of(model, options));
+  const auto plain = names_of(sweeps_of(model, options, EffectPlan(model, options, {})));
   const std::vector<std::string> joint{"joint_impulses_map", "joint_impulses_end_map"}, body{"add_given_up", "world_placement_down"};
   const auto check_added = [&](const Effects& effects, std::vector<std::string> sweeps) {
     std::multiset<std::string> expected = plain;
     expected.insert(sweeps.begin(), sweeps.end());
-    CHECK(names_of(sweeps_of(model, options, effects)) == expected);
-    CHECK(EffectPlan(model, options, effects).any());
+    const EffectPlan plan(model, options, effects);
+    CHECK(names_of(sweeps_of(model, options, plan)) == expected);
+    CHECK(plan.any());
   };
   const auto with = [](std::vector<std::string> some, const std::vector<std::string>& more) {
     some.insert(some.end(), more.begin(), more.end());
@@ -59,8 +60,9 @@ TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no ot
   check_added(drag, with({"drag_map"}, body));
   check_added(wrench, with({"wrench_map"}, body));
   check_added(ground, with({"ground_map", "find_ground", "revise_ground"}, body));
-  CHECK(names_of(sweeps_of(model, options, empty_ground)) == plain);
-  CHECK_FALSE(EffectPlan(model, options, empty_ground).any());
+  const EffectPlan nothing(model, options, empty_ground);
+  CHECK(names_of(sweeps_of(model, options, nothing)) == plain);
+  CHECK_FALSE(nothing.any());
 }
 
 }  // namespace linden
