@@ -87,7 +87,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, pace, applied, mass, targets, contacts;
+  Numbers<Real> q, p, pace, applied, mass, targets, frictions, contacts;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -120,7 +120,10 @@ struct BatchOf<Real>::Data {
     });
   }
 
-  Index servos() const { return static_cast<Index>(plan.effects.servos.size()); }
+  template <class Entry>
+  static Index count_of(const std::vector<Entry>& entries) {
+    return static_cast<Index>(entries.size());
+  }
   const Shape& shape() const { return model->tree.shape; }
   std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
 
@@ -132,7 +135,8 @@ struct BatchOf<Real>::Data {
             pace.data() + at(b, 2),
             applied.empty() ? nullptr : applied.data() + at(b, nv),
             mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
-            targets.empty() ? nullptr : targets.data() + at(b, servos()),
+            targets.empty() ? nullptr : targets.data() + at(b, count_of(plan.effects.servos)),
+            frictions.empty() ? nullptr : frictions.data() + at(b, count_of(plan.effects.friction)),
             contacts.empty() ? nullptr : contacts.data() + at(b, static_cast<Index>(plan.ground.points.size())),
             records.data() + b * lanes,
             static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
@@ -153,6 +157,21 @@ struct BatchOf<Real>::Data {
     arena.execute([&] {
       oneapi::tbb::parallel_for(std::int64_t{0}, blocks, [&](std::int64_t b) { work(b, worker()); });
     });
+  }
+
+  /// A number an entry of an effect and instance, at first the entries' own.
+  template <class Entry>
+  BatchView<Real> numbers_of(Numbers<Real>& numbers, const std::vector<Entry>& entries, double Entry::*own) {
+    if (numbers.empty()) {
+      numbers.resize(at(blocks, count_of(entries)));
+      for_blocks([&](std::int64_t b, Worker&) {
+        Real* to = numbers.data() + at(b, count_of(entries));
+        for (const Entry& entry : entries) {
+          for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(entry.*own);
+        }
+      });
+    }
+    return {numbers, count_of(entries), lanes};
   }
 
   Real* mass_row(std::int64_t i, Index slot) {
@@ -265,16 +284,12 @@ BatchView<Real> BatchOf<Real>::forces() {
 
 template <class Real>
 BatchView<Real> BatchOf<Real>::servo_targets() {
-  if (data_->targets.empty()) {
-    data_->targets.resize(data_->at(data_->blocks, data_->servos()));
-    data_->for_blocks([&](std::int64_t b, typename Data::Worker&) {
-      Real* to = data_->targets.data() + data_->at(b, data_->servos());
-      for (const Servo& servo : data_->plan.effects.servos) {
-        for (int l = 0; l < lanes(); ++l) *to++ = static_cast<Real>(servo.target);
-      }
-    });
-  }
-  return {data_->targets, data_->servos(), lanes()};
+  return data_->numbers_of(data_->targets, data_->plan.effects.servos, &Servo::target);
+}
+
+template <class Real>
+BatchView<Real> BatchOf<Real>::friction() {
+  return data_->numbers_of(data_->frictions, data_->plan.effects.friction, &JointFriction::force);
 }
 
 template <class Real>
@@ -382,7 +397,12 @@ std::string BatchOf<Real>::describe(std::int64_t i) const {
 
 template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
-  return (data_->q.size() + data_->p.size() + data_->pace.size() + data_->applied.size() + data_->mass.size()) * sizeof(Real) +
+  std::size_t numbers = 0;
+  for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->pace, &data_->applied, &data_->mass, &data_->targets, &data_->frictions,
+                                    &data_->contacts}) {
+    numbers += some->size();
+  }
+  return numbers * sizeof(Real) +
          data_->past.size() * sizeof(std::uint32_t) + data_->records.size() * sizeof(InstanceRecord);
 }
 

@@ -14,7 +14,8 @@
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
 //
-// Effects act as in a Simulation, on lanes and threads alike; servo targets and forces may differ from instance to instance.
+// Effects act as in a Simulation, on lanes and threads alike; forces, servo targets and joint friction may differ from instance to
+// instance.
 //
 // Models with mimic joints are stepped an instance at a time, on all threads but without lanes.
 #pragma once
@@ -104,6 +105,8 @@ class BatchOf {
 
   /// Targets of the servos [rad, m] in the order of Effects::servos, likewise: rows to be written at will, at first those of the effects.
   BatchView<Real> servo_targets();
+  /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none may be negative.
+  BatchView<Real> friction();
 
   /// Mass m [kg], first moment m c [kg m] and inertia xx xy xz yy yz zz [kg m^2] about the body frame's origin, of one body of one
   /// instance; the first call gives every instance masses of its own. Keeps positions and momenta, so set it before reset. Throws

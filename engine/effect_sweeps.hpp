@@ -99,6 +99,10 @@ class EffectSweeps {
       for (std::size_t k = 0; k < effects.servos.size(); ++k) servos_.target(static_cast<Index>(k)) = as<S>(effects.servos[k].target);
       frictions_.entries = effects.friction;
       rows(frictions_.mode, effects.friction.size());
+      rows(frictions_.force, effects.friction.size());
+      for (std::size_t k = 0; k < effects.friction.size(); ++k) {
+        frictions_.force(static_cast<Index>(k)) = as<S>(effects.friction[k].force);
+      }
       limits_.entries = effects.limits;
       for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
     }
@@ -132,6 +136,7 @@ class EffectSweeps {
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
   Field<S>& servo_targets() { return servos_.target; }
+  Field<S>& friction_forces() { return frictions_.force; }
 
   /// After placements changed. Returns the potential energy of springs and of the ground at q [J].
   S refresh(const Field<S, 12>& placement, const Field<S>& q) {
@@ -325,6 +330,53 @@ class EffectSweeps {
     using std::abs;
     return work.magnitude() + abs(spring_work(plan_.effects.springs, plan_.q_row, *q_, delta)) +
            abs(ball_spring_work(plan_.effects.ball_springs, tree_, *q_, motion, delta));
+  }
+  /// Its kernels by their names in the schedule (sweeps.hpp), to be measured one by one in a step that has been evaluated: visit(name,
+  /// call). What the calls write is of no use.
+  template <class Element, class Visit>
+  void each_kernel(const BodyConstants<Element>& constants, const Field<S>& q, Workspace<S>& work, Field<S>& end, const Visit& visit) {
+    const Effects& effects = plan_.effects;
+    const auto past = [&work](Index row, int) { return work.delta(row); };
+    const auto on = [&](bool any, const char* name, auto call) {
+      if (any) visit(name, std::move(call));
+    };
+    const bool points = !plan_.ground.points.empty();
+    on(!effects.limits.empty(), "begin_limits", [=, this, &q, &work] { begin_limits(limits_, plan_.q_row, h_, q, past, true, work.delta); });
+    on(!effects.friction.empty(), "begin_friction", [=, this, &work] { begin_friction(frictions_, past, true, work.delta); });
+    on(!effects.armature.empty(), "armature_map", [=, this] { armature_map(plan_.effects.armature, sum_); });
+    on(!effects.springs.empty(), "spring_map", [=, this, &q] { spring_map(plan_.effects.springs, plan_.q_row, h_, q, sum_); });
+    on(!effects.ball_springs.empty(), "ball_spring_stiffness",
+       [=, this] { ball_spring_stiffness(plan_.effects.ball_springs, tree_, h_, sum_); });
+    on(!effects.damping.empty(), "damping_map", [=, this] { damping_map(plan_.effects.damping, plan_.damping_share, h_, sum_); });
+    on(!effects.torques.empty(), "torque_map", [=, this] { torque_map(plan_.effects.torques, force_, h_, sum_); });
+    on(!effects.servos.empty(), "servo_map", [=, this, &q] { servo_map(servos_, plan_.q_row, h_, q, sum_); });
+    on(!effects.friction.empty(), "friction_map", [=, this] { friction_map(frictions_, h_, 0.0, sum_); });
+    const auto on_bodies = [=, this](auto call) {
+      return [=, this] {
+        for (const TouchedBody& body : plan_.touched) call(body);
+      };
+    };
+    on(!effects.drag.empty(), "drag_map", on_bodies([this, &constants, &work](const TouchedBody& body) {
+         drag_map(drags_, body.drag.first, body.drag.last, constants, h_, work.displacement, bodies_, work.impulse);
+       }));
+    on(!effects.wrenches.empty(), "wrench_map", on_bodies([this, &work](const TouchedBody& body) {
+         wrench_map(wrenches_, body.wrenches.first, body.wrenches.last, h_, work.displacement, bodies_, work.impulse);
+       }));
+    on(points, "ground_map", on_bodies([this, &work](const TouchedBody& body) {
+         ground_map(plan_.ground, body.points.first, body.points.last, h_, 0.0, work.displacement, points_, bodies_, work.impulse);
+       }));
+    on(plan_.joints, "joint_impulses_map", [=, this, &work] { joint_impulses_map(sum_, work.delta, work.momentum_target); });
+    on(!effects.ball_springs.empty(), "ball_spring_map",
+       [=, this, &q, &work] { ball_spring_map(plan_.effects.ball_springs, tree_, h_, q, work.motion, work.momentum_target); });
+    on(!effects.servos.empty(), "revise_servos", [=, this, &q, &work] { revise_servos(servos_, plan_.q_row, h_, q, work.delta); });
+    on(!effects.friction.empty(), "revise_friction",
+       [=, this, &work] { revise_friction(frictions_, h_, work.innovation, true, S(0.0), work.delta); });
+    on(!effects.limits.empty(), "revise_limits", [=, this, &work] { revise_limits(limits_, work.innovation, true, work.delta); });
+    on(points, "revise_ground", [=, this] { revise_ground(points_, true, S(0.0)); });
+    on(plan_.joints, "joint_impulses_end_map", [=, this, &work, &end] { joint_impulses_end_map(sum_, h_, work.delta, end); });
+    on(plan_.bodies, "add_given_up", [=, this, &work] { add_given_up(tree_, work.placement, bodies_.given, work.impulse); });
+    on(plan_.bodies, "world_placement_down", [=, this, &work] { world_placement_down(tree_, work.placement, bodies_.pose); });
+    on(points, "find_ground", [=, this] { find_ground(plan_.ground, bodies_.pose, points_); });
   }
   /// Taken from work().ground once the potential at the end is known.
   S ground_stored() const { return ground_potential_ - ground_before_; }

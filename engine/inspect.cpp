@@ -17,6 +17,7 @@
 #include "engine/mass_distribution.hpp"
 #include "engine/output_file.hpp"
 #include "engine/report_files.hpp"
+#include "engine/sweep_cost.hpp"
 #include "engine/sweeps.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -117,10 +118,27 @@ Index widest_level(const Tree& tree) {
   return widest;
 }
 
+/// The sweeps of a step, and what all of it costs on this machine.
+struct Costs {
+  std::vector<Sweep> sweeps;
+  std::vector<double> of_sweeps;    // [ns per body]; NaN where it is not one sweep
+  std::vector<EffectCost> effects;  // of a scene
+};
+
+Costs measure(const InspectArguments& arguments, const Model& model) {
+  const EffectPlan plan(model, arguments.options, arguments.effects());
+  Costs costs;
+  costs.sweeps = sweeps_of(model, arguments.options, plan);
+  const InitialState start = arguments.scene ? arguments.scene->initial : InitialState();
+  costs.of_sweeps = sweep_costs(model, arguments.options, plan, start, costs.sweeps);
+  if (arguments.scene) costs.effects = effect_costs(*arguments.scene);
+  return costs;
+}
+
 class Printer {
  public:
-  Printer(const InspectArguments& arguments, const Model& model, std::vector<EffectCost> costs)
-      : arguments_(arguments), model_(model), bodies_(bodies_of(model)), costs_(std::move(costs)) {}
+  Printer(const InspectArguments& arguments, const Model& model, const Costs& costs)
+      : arguments_(arguments), model_(model), bodies_(bodies_of(model)), costs_(costs) {}
 
   void print() const {
     totals();
@@ -173,10 +191,10 @@ class Printer {
     for (const EffectLine& line : effect_lines(scene.effects, model_)) {
       fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
     }
-    if (costs_.empty()) return;
-    fmt::print("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs_.front().nanoseconds,
-               costs_.back().nanoseconds);
-    for (std::size_t k = 1; k + 1 < costs_.size(); ++k) fmt::print("  {:<9} {:+.0f} alone\n", costs_[k].name, costs_[k].nanoseconds);
+    const std::vector<EffectCost>& costs = costs_.effects;
+    fmt::print("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs.front().nanoseconds,
+               costs.back().nanoseconds);
+    for (std::size_t k = 1; k + 1 < costs.size(); ++k) fmt::print("  {:<9} {:+.0f} alone\n", costs[k].name, costs[k].nanoseconds);
   }
 
   void table() const {
@@ -252,15 +270,19 @@ class Printer {
 
   void sweeps() const {
     fmt::print("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
-    Table table({{"when", Align::left}, {"sweep", Align::left}, {"reads", Align::left}, {"writes", Align::left}}, kLineWidth);
+    Table table({{"when", Align::left}, {"sweep", Align::left}, {"ns/body", Align::right}, {"reads", Align::left}, {"writes", Align::left}},
+                kLineWidth);
     std::string_view before;
-    for (const Sweep& sweep : sweeps_of(model_, arguments_.options, EffectPlan(model_, arguments_.options, arguments_.effects()))) {
-      table.add({std::string(sweep.when == before ? "" : sweep.when), std::string(sweep.name), std::string(sweep.reads),
-                 std::string(sweep.writes)});
+    for (std::size_t k = 0; k < costs_.sweeps.size(); ++k) {
+      const Sweep& sweep = costs_.sweeps[k];
+      const double cost = costs_.of_sweeps[k];
+      table.add({std::string(sweep.when == before ? "" : sweep.when), std::string(sweep.name),
+                 std::isfinite(cost) ? fmt::format("{:.2f}", cost) : "-", std::string(sweep.reads), std::string(sweep.writes)});
       before = sweep.when;
     }
     fmt::print("{}", table.text("  "));
-    fmt::print("  evaluation: of the first guess and after every correction; once a step: again where a correction gains little\n");
+    fmt::print("  evaluation: of the first guess and after every correction; once a step: again where a correction gains little.\n"
+               "  ns/body: of each sweep alone on this machine, over the whole tree\n");
   }
 
   void warnings() const {
@@ -272,10 +294,10 @@ class Printer {
   const InspectArguments& arguments_;
   const Model& model_;
   std::vector<BodyFacts> bodies_;
-  std::vector<EffectCost> costs_;  // of a scene
+  const Costs& costs_;
 };
 
-Json json_of(const InspectArguments& arguments, const Model& model, const std::vector<EffectCost>& costs) {
+Json json_of(const InspectArguments& arguments, const Model& model, const Costs& costs) {
   const Tree& tree = model.tree;
   const MassDistribution masses = mass_distribution(model, model.neutral());
   const std::vector<BodyFacts> bodies = bodies_of(model);
@@ -333,8 +355,14 @@ Json json_of(const InspectArguments& arguments, const Model& model, const std::v
                       {"offset", mimic.offset}});
   }
   Json& sweeps = result["sweeps"] = Json::array();
-  for (const Sweep& sweep : sweeps_of(model, arguments.options, EffectPlan(model, arguments.options, arguments.effects()))) {
-    sweeps.push_back({{"when", sweep.when}, {"name", sweep.name}, {"reads", sweep.reads}, {"writes", sweep.writes}});
+  for (std::size_t k = 0; k < costs.sweeps.size(); ++k) {
+    const Sweep& sweep = costs.sweeps[k];
+    // a cost that was not measured becomes null
+    sweeps.push_back({{"when", sweep.when},
+                      {"name", sweep.name},
+                      {"ns_per_body", costs.of_sweeps[k]},
+                      {"reads", sweep.reads},
+                      {"writes", sweep.writes}});
   }
   if (arguments.scene) {
     const Scene& scene = *arguments.scene;
@@ -342,7 +370,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const std::v
     result["duration"] = scene.duration;
     result["gravity"] = arguments.options.gravity;
     result["effects"] = effects_json(scene.effects, model);
-    for (const EffectCost& cost : costs) result["ns_per_body_step"][cost.name] = cost.nanoseconds;
+    for (const EffectCost& cost : costs.effects) result["ns_per_body_step"][cost.name] = cost.nanoseconds;
     result["initial"] = {{"positions", scene.initial.positions}, {"velocities", scene.initial.velocities}};
   }
   result["warnings"] = model.warnings;
@@ -357,7 +385,7 @@ int inspect(const InspectArguments& arguments) {
   if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
   const std::shared_ptr<const Model> loaded = arguments.loaded();
   const Model& model = *loaded;
-  const std::vector<EffectCost> costs = arguments.scene ? effect_costs(*arguments.scene) : std::vector<EffectCost>();
+  const Costs costs = measure(arguments, model);
   if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs));
   Printer(arguments, model, costs).print();
   return 0;

@@ -26,6 +26,7 @@ class InstanceStepper {
   double contact(Index k) const { return stepper_.contact(k); }
   /// Targets of the plan's servos, to be written.
   std::span<double> servo_targets() { return stepper_.servo_targets(); }
+  std::span<double> friction_forces() { return stepper_.friction_forces(); }
 
   /// One step of the state, from `time` on. state().pace says what is known of the step before.
   StepReport step(double time);

@@ -210,10 +210,11 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Pack refresh_effects() { return effect_potential_ = effects_->refresh(work_.placement, q_); }
 
   void load_effects(const Block<Real>& block) {
-    if (block.targets != nullptr) {
-      Field<Pack>& targets = effects_->servo_targets();
-      for (Index k = 0; k < targets.rows(); ++k) targets(k) = L::load(block.targets + k * W);
-    }
+    const auto load = [](const Real* from, Field<Pack>& to) {
+      for (Index k = 0; from != nullptr && k < to.rows(); ++k) to(k) = L::load(from + k * W);
+    };
+    load(block.targets, effects_->servo_targets());
+    load(block.frictions, effects_->friction_forces());
     if (block.contacts == nullptr) return;
     for (Index k = 0; k < effects_->contacts(); ++k) effects_->set_contact(k, L::load(block.contacts + k * W));
   }
@@ -504,6 +505,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     take(p_, state.p.flat());
     if (has_applied_) take(applied_, alone_.applied());
     if (effects_ && block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
+    if (effects_ && block.frictions != nullptr) take(effects_->friction_forces(), alone_.friction_forces());
     if constexpr (kOwnMasses) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
       for (Index i = 0; i < inertia.rows(); ++i) {

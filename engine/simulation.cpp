@@ -108,6 +108,17 @@ void Simulation::set_servo_targets(std::span<const double> targets) {
   std::ranges::copy(targets, to.begin());
 }
 
+void Simulation::set_friction(std::span<const double> forces) {
+  const std::span<double> to = stepper_.friction_forces();
+  check_row_count("forces of friction", forces.size(), static_cast<Index>(to.size()));
+  for (std::size_t k = 0; k < forces.size(); ++k) {
+    if (!std::isfinite(forces[k]) || forces[k] < 0) {
+      throw InputError(fmt::format("the force of friction {} is {}; expected a finite number, zero or more", k, forces[k]));
+    }
+  }
+  std::ranges::copy(forces, to.begin());
+}
+
 void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, const std::array<double, 3>& moment) {
   const auto wrench = std::ranges::find(plan_->effects.wrenches, slot, &BodyWrench::slot);
   if (wrench == plan_->effects.wrenches.end()) {

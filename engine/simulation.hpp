@@ -59,6 +59,8 @@ class Simulation {
   /// Targets of the servos [rad, m], in the order of Effects::servos, the same over every step until they are set anew. Throws InputError
   /// for a wrong count or a number that is not finite.
   void set_servo_targets(std::span<const double> targets);
+  /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none negative.
+  void set_friction(std::span<const double> forces);
 
   /// The first wrench that the effects name on a body, from now on: force [N] and moment [N m] in the directions and at the point that it
   /// was given with. Throws InputError where the effects name none on that body (one of zero will do) or a number is not finite.

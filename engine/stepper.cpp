@@ -122,6 +122,11 @@ std::span<double> Stepper::servo_targets() {
   return effects_->servo_targets().flat();
 }
 
+std::span<double> Stepper::friction_forces() {
+  if (!effects_) return {};
+  return effects_->friction_forces().flat();
+}
+
 std::vector<std::span<double>> Stepper::effect_memory() {
   if (!effects_) return {};
   const auto memory = effects_->memory();

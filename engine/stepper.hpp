@@ -56,6 +56,8 @@ class Stepper {
   StepReport step(State<double>& state, int& history, double time, double h);
   /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; empty without servos.
   std::span<double> servo_targets();
+  /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
+  std::span<double> friction_forces();
   /// How contact point k ended the last step (EffectSweeps::contact).
   double contact(Index k) const { return effects_->contact(k); }
   /// What effects keep from step to step beside the state: part of a checkpoint.

@@ -31,7 +31,8 @@ namespace linden {
 template <class S>
 struct Frictions {
   std::span<const JointFriction> entries;
-  Field<S> mode;  // of each
+  Field<S> force;  // f of each, not negative
+  Field<S> mode;   // of each
 };
 
 template <class S>
@@ -76,10 +77,9 @@ template <class S>
 void friction_map(const Frictions<S>& frictions, const S& h, double creep, JointImpulses<S>& sum) {
   const S zero(0.0);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
-    const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
-    const S f = h * as<S>(friction.force);
+    const S f = h * frictions.force(k);
     const S soft = creep > 0 ? select(frictions.mode(k) == zero, f / as<S>(creep), zero) : zero;
-    add_impulse(sum, friction.row, 1, frictions.mode(k) * (h * f), soft);
+    add_impulse(sum, frictions.entries[static_cast<std::size_t>(k)].row, 1, frictions.mode(k) * (h * f), soft);
   }
 }
 
@@ -94,8 +94,8 @@ void hold_friction(const Frictions<S>& frictions, JointImpulses<S>& sum) {
 template <class S>
 LINDEN_INLINE S friction_load(const Frictions<S>& frictions, Index k, const S& h, const Field<S>& residual) {
   using std::abs;
-  const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
-  const S zero(0.0), most = h * h * as<S>(friction.force), held = abs(residual(friction.row));
+  const S zero(0.0), most = h * h * frictions.force(k);
+  const S held = abs(residual(frictions.entries[static_cast<std::size_t>(k)].row));
   return select(frictions.mode(k) == zero, select(held > zero, held / most, zero), zero);
 }
 
@@ -137,7 +137,7 @@ S friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& resid
   S sum(0.0);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
     const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
-    const S held = -residual(friction.row) / (h * h), sliding = as<S>(friction.force) * frictions.mode(k);
+    const S held = -residual(friction.row) / (h * h), sliding = frictions.force(k) * frictions.mode(k);
     const S force = select(frictions.mode(k) == S(0.0), held, sliding);
     sum = sum + force * worked(1, delta(friction.row), before(friction.row));
   }

@@ -8,7 +8,7 @@
 //
 // No penalty: a closed joint is taken out of the solve, as one that friction holds. A joint never passes its limit by more than the
 // solver's rounding; one that starts beyond it may come back but go no further. The step that meets the limit ends on it; the one
-// after gives back e times the displacement of the step before (Newton's law of impact).
+// after gives back e times the displacement of the step before (Newton's law of impact), which a batch remembers in single precision.
 //
 // units   [rad, m]; e without
 // energy  takes -impulse x worked / h

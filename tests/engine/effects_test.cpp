@@ -442,6 +442,130 @@ TEST_CASE("instances of a batch have servo targets of their own", "[effects][bat
   CHECK(simulation.positions()[0] == Approx(-0.3).margin(1e-9));
 }
 
+TEST_CASE("instances of a batch have joint friction of their own", "[effects][batch]") {
+  const double inertia = 0.02, v = 2;
+  Effects effects;
+  effects.friction = {{.row = 0, .force = 0.4}};
+  BatchOptions options;
+  static_cast<Options&>(options) = still();
+  Batch batch(rotor(inertia), 9, options, effects);
+  for (std::int64_t i = 0; i < 9; ++i) {
+    batch.friction()(i, 0) = 0.05 * static_cast<double>(i + 1);
+    batch.reset(i, std::vector<double>{0}, std::vector<double>{v});
+  }
+  batch.step(2000);
+  // v^2 I / 2 f, taken at the beginnings of steps: half a step of the first velocity more or less
+  const auto stops = [&](double force) { return Approx(0.5 * inertia * v * v / force).margin(0.51e-3 * v); };
+  for (std::int64_t i = 0; i < 9; ++i) CHECK(batch.positions()(i, 0) == stops(0.05 * static_cast<double>(i + 1)));
+  Simulation simulation(rotor(inertia), still(), effects);
+  set(simulation, {0}, {v});
+  simulation.set_friction(std::vector<double>{0.1});
+  run(simulation, 2000);
+  CHECK(simulation.positions()[0] == stops(0.1));
+  CHECK_THROWS_AS(simulation.set_friction(std::vector<double>{-0.1}), InputError);
+  CHECK_THROWS_AS(simulation.set_friction(std::vector<double>{}), InputError);
+}
+
+TEST_CASE("every effect moves an instance of a batch as it moves a simulation, in single precision nearly", "[effects][batch]") {
+  const Model model = ball_chain(2);
+  const std::shared_ptr<const Model> chained = std::make_shared<const Model>(chain(4));
+  Effects joints;
+  joints.armature = {{.row = 0, .inertia = 0.02}};
+  joints.springs = {{.row = 1, .stiffness = 3, .rest = 0.2}};
+  joints.damping = {{.row = 2, .coefficient = 0.05}};
+  joints.friction = {{.row = 0, .force = 0.1}};
+  joints.limits = {{.row = 3, .lower = -0.2, .upper = 0.3}};
+  joints.servos = {{.row = 1, .stiffness = 5, .damping = 0.3, .target = 0.4, .max_force = 0.6}};
+  joints.torques = {{.row = 2, .force = {{0, 0.05, 0.1}, {0, 0.4, -0.2}}}};
+  joints.drag = {{.slot = 4, .linear = 0.1, .quadratic = 0.2}};
+  joints.wind = {0.5, -0.2, 0.1};
+  joints.wrenches = {{.slot = 3, .force = {0.3, 0, 0.1}, .moment = {0, 0.1, 0}, .from = 0.02, .to = 0.15}};
+  const std::vector<double> q{0.1, -0.2, 0.3, 0.25}, v{0.5, -0.4, 0.8, 1.5};
+  constexpr int kSteps = 200;
+  const auto numbers_of = [](const auto& batch) {
+    std::vector<double> numbers;
+    for (const auto value : batch.positions().instance(4)) numbers.push_back(static_cast<double>(value));
+    return numbers;
+  };
+  const auto end_of = [&](auto& batch) {
+    for (std::int64_t i = 0; i < batch.size(); ++i) batch.reset(i, q, v);
+    batch.step(kSteps);
+    CHECK(batch.summary().frozen == 0);
+    return numbers_of(batch);
+  };
+  Simulation simulation(chained, {}, joints);
+  set(simulation, q, v);
+  run(simulation, kSteps);
+  BatchOptions options;
+  Batch batch(chained, 5, options, joints);
+  CHECK(distance(simulation.positions(), end_of(batch)) < 1e-8);
+  FloatBatch single(chained, 5, options, joints);
+  CHECK(distance(simulation.positions(), end_of(single)) < 1e-3);
+
+  // an instance that starts late is at its own time: the table and the wrench begin anew
+  batch.step(37);
+  batch.reset(4, q, v);
+  batch.step(kSteps);
+  CHECK(distance(simulation.positions(), numbers_of(batch)) < 1e-8);
+
+  // the speed that a limit gives back is remembered in single precision
+  joints.limits[0].restitution = 0.5;
+  Simulation bounced(chained, {}, joints);
+  set(bounced, q, v);
+  run(bounced, kSteps);
+  Batch bounced_batch(chained, 5, options, joints);
+  CHECK(distance(bounced.positions(), end_of(bounced_batch)) < 1e-4);
+  CHECK(distance(bounced.positions(), simulation.positions()) > 1e-2);
+
+  Effects ball;
+  ball.ball_springs = {{.slot = 1, .stiffness = 2, .rest = {0, 0, std::sin(0.2), std::cos(0.2)}}};
+  ball.damping = {{.row = 3, .coefficient = 0.02}};
+  Simulation turned(model, {}, ball);
+  run(turned, kSteps);
+  Batch turned_batch(model, 5, options, ball);
+  turned_batch.step(kSteps);
+  CHECK(distance(turned.positions(), numbers_of(turned_batch)) < 1e-8);
+}
+
+TEST_CASE("what is damped far beyond its time constant comes to rest without ringing", "[effects]") {
+  for (const double coefficient : {20.0 * 2, 20.0 * 50, 20.0 * 1e6}) {  // ratio 2 and more at 1 ms and 0.02 kg m^2
+    Effects effects;
+    effects.damping = {{.row = 0, .coefficient = coefficient}};
+    Simulation simulation(rotor(), still(), effects);
+    set(simulation, {0}, {1});
+    double before = simulation.positions()[0], last = 1;
+    for (int k = 0; k < 20; ++k) {
+      run(simulation, 1);
+      const double moved = simulation.positions()[0] - before;
+      before = simulation.positions()[0];
+      INFO("coefficient " << coefficient << ", step " << k);
+      CHECK(moved >= 0);
+      CHECK(moved <= last);
+      last = moved;
+    }
+    CHECK(last < 1e-8);
+  }
+}
+
+TEST_CASE("a cylinder stands upright on its rim and does not wander", "[effects]") {
+  LinkSpec can;
+  can.name = "can";
+  can.joint = "base";
+  can.type = JointType::free;
+  can.inertia = {1, Eigen::Vector3d::Zero(), Eigen::Vector3d(0.01, 0.01, 0.005).asDiagonal()};
+  Effects effects;
+  effects.ground = Ground{.stiffness = 1e5, .damping = 300, .friction = 0.6};
+  for (const double z : {-0.1, 0.1}) effects.ground->contacts.rims.push_back({.slot = 1, .center = {0, 0, z}, .axis = {0, 0, 1}, .radius = 0.05});
+  Simulation standing(TreeBuilder("can").add(can).build(), {}, effects);
+  set(standing, {0, 0, 0.1005, 0, 0, 0, 1}, std::vector<double>(6, 0.0));
+  run(standing, 5000);
+  const auto q = standing.positions();
+  CHECK(std::abs(q[0]) + std::abs(q[1]) < 1e-6);
+  CHECK(q[2] == Approx(0.1 - 9.81 / 1e5 / 4).margin(1e-6));  // four points of the rim bear the weight
+  CHECK(std::abs(q[3]) + std::abs(q[4]) < 1e-6);
+  CHECK(std::abs(standing.velocities()[2]) < 1e-6);
+}
+
 TEST_CASE("a caller changes wrenches and forces from step to step", "[effects]") {
   Effects effects;
   effects.wrenches = {{.slot = 1}};

@@ -1,9 +1,11 @@
 #include <catch2/catch.hpp>
 
+#include <cmath>
 #include <set>
 #include <string>
 
 #include "engine/effect_plan.hpp"
+#include "engine/sweep_cost.hpp"
 #include "engine/sweeps.hpp"
 #include "models/generators.hpp"
 
@@ -63,6 +65,42 @@ TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no ot
   const EffectPlan nothing(model, options, empty_ground);
   CHECK(names_of(sweeps_of(model, options, nothing)) == plain);
   CHECK_FALSE(nothing.any());
+}
+
+TEST_CASE("every sweep of a schedule is measured under its name") {
+  Effects everything;
+  everything.armature = {{.row = 0, .inertia = 1}};
+  everything.springs = {{.row = 0, .stiffness = 1}};
+  everything.ball_springs = {{.slot = 2, .stiffness = 1}};
+  everything.damping = {{.row = 0, .coefficient = 1}};
+  everything.friction = {{.row = 0, .force = 1}};
+  everything.limits = {{.row = 0, .lower = -1}};
+  everything.servos = {{.row = 0, .stiffness = 1, .max_force = 1}};
+  everything.torques = {{.row = 0, .force = {}}};
+  everything.drag = {{.slot = 1, .linear = 1}};
+  everything.wrenches = {{.slot = 1}};
+  everything.ground = Ground{};
+  everything.ground->contacts.spheres = {{.slot = 1, .center = {0, 0, 0.1}, .radius = 0.1}};
+  LinkSpec first, second;
+  first.name = "first";
+  first.joint = "hinge";
+  first.inertia = second.inertia = {1, {0, 0, -0.1}, 0.1 * Eigen::Matrix3d::Identity()};
+  second.name = "second";
+  second.parent = "first";
+  second.joint = "ball";
+  second.type = JointType::ball;
+  const Model model = TreeBuilder("two").add(first).add(second).build();
+  for (const Solver solver : {Solver::newton, Solver::riqn}) {
+    const Options options{.solver = solver};
+    const EffectPlan plan(model, options, everything);
+    const std::vector<Sweep> sweeps = sweeps_of(model, options, plan);
+    const std::vector<double> costs = sweep_costs(model, options, plan, {}, sweeps);
+    REQUIRE(costs.size() == sweeps.size());
+    for (std::size_t k = 0; k < sweeps.size(); ++k) {
+      INFO(sweeps[k].name);
+      CHECK((std::isfinite(costs[k]) && costs[k] >= 0));
+    }
+  }
 }
 
 }  // namespace linden
