@@ -10,10 +10,8 @@
 #include <optional>
 #include <span>
 
-#include "engine/baseline.hpp"
-#include "engine/batch.hpp"
+#include "engine/accuracy_mover.hpp"
 #include "engine/composition.hpp"
-#include "layout/input_error.hpp"
 
 namespace linden {
 namespace {
@@ -27,127 +25,25 @@ constexpr double kTolerances[] = {1e-6, 1e-8, 1e-10, 1e-12};
 constexpr double kReferenceTolerance = 1e-13, kSettledGap = 1e-12;
 /// Smallest steps of the reference in steps of the options: on chaotic motions half a step more gains no more than a moment.
 constexpr double kSmallest = 1.0 / 8, kSmallestOfRk4 = 1.0 / 32;
+/// Of order 2 against itself, which gains a factor of two to four a halving. What is sudden leaves little below its own tolerance.
+constexpr double kSmallestAlone = 1.0 / 64, kAloneTolerance = 1e-11, kJudgedAlone = 1e-3;
 constexpr double kReferenceShare = 0.22;  // of the budget, for each of the two
 constexpr double kShort = 0.03;           // CPU seconds below which a run is timed again
 
-constexpr AccuracyMethod kMethods[] = {{Kind::composed, 2}, {Kind::composed, 4}, {Kind::composed, 6},
-                                       {Kind::composed, 8}, {Kind::rk4, 4},      {Kind::semi_implicit_euler, 1}};
+constexpr AccuracyMethod kOrder2{Kind::composed, 2}, kOrder8{Kind::composed, 8}, kRk4{Kind::rk4, 4},
+    kEuler{Kind::semi_implicit_euler, 1};
+
+/// Those that know what the scene's effects do.
+std::vector<AccuracyMethod> methods_for(const Effects& effects) {
+  if (irreversible(effects).empty()) return {kOrder2, {Kind::composed, 4}, {Kind::composed, 6}, kOrder8, kRk4, kEuler};
+  if (sudden(effects).empty()) return {kOrder2, kRk4, kEuler};
+  return {kOrder2};
+}
 
 double cpu_seconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Whoever moves the model.
-class Mover {
- public:
-  virtual ~Mover() = default;
-  /// False where the step failed.
-  virtual bool step() = 0;
-  virtual Energy energy() = 0;
-  virtual std::optional<Momentum> momentum() = 0;
-  virtual std::span<const double> positions() = 0;
-  virtual std::int64_t evaluations() const = 0;
-  virtual std::int64_t split_steps() const { return 0; }
-  virtual std::string failure() const = 0;
-};
-
-class ComposedMover final : public Mover {
- public:
-  ComposedMover(const AccuracySetup& setup, const Options& options) : simulation_(setup.model, options, setup.effects) {
-    if (!setup.start.positions.empty()) simulation_.set_positions(setup.start.positions);
-    if (!setup.start.velocities.empty()) simulation_.set_velocities(setup.start.velocities);
-  }
-  bool step() override {
-    const StepReport report = simulation_.step();
-    evaluations_ += report.evaluations;
-    split_ += report.substeps > 1 ? 1 : 0;
-    if (!report.ok()) failure_ = simulation_.describe(report);
-    return report.ok();
-  }
-  Energy energy() override { return simulation_.energy(); }
-  std::optional<Momentum> momentum() override { return simulation_.momentum(); }
-  std::span<const double> positions() override { return simulation_.positions(); }
-  std::int64_t evaluations() const override { return evaluations_; }
-  std::int64_t split_steps() const override { return split_; }
-  std::string failure() const override { return fmt::format("at {:.4g} s: {}", simulation_.time(), failure_); }
-
- private:
-  Simulation simulation_;
-  std::int64_t evaluations_ = 0, split_ = 0;
-  std::string failure_;
-};
-
-class BaselineMover final : public Mover {
- public:
-  BaselineMover(const AccuracySetup& setup, Scheme scheme, const Options& options)
-      : baseline_(setup.model, scheme, options, setup.effects) {
-    ComposedMover start(setup, options);  // says what the scene's start is where it leaves something out
-    std::vector<double> v = setup.start.velocities;
-    if (v.empty()) v.resize(static_cast<std::size_t>(setup.model->tree.shape.velocities));
-    baseline_.set(start.positions(), v);
-  }
-  bool step() override { return baseline_.step(); }
-  Energy energy() override { return baseline_.energy(); }
-  std::optional<Momentum> momentum() override { return baseline_.momentum(); }
-  std::span<const double> positions() override { return baseline_.positions(); }
-  std::int64_t evaluations() const override { return baseline_.evaluations(); }
-  std::string failure() const override { return fmt::format("at {:.4g} s: the result is not finite", baseline_.time()); }
-
- private:
-  Baseline baseline_;
-};
-
-class SingleMover final : public Mover {
- public:
-  SingleMover(const AccuracySetup& setup, const Options& options) : batch_(setup.model, 1, batch_options(options)) {
-    ComposedMover start(setup, options);
-    std::vector<double> v = setup.start.velocities;
-    if (v.empty()) v.resize(static_cast<std::size_t>(setup.model->tree.shape.velocities));
-    batch_.reset(0, start.positions(), v);
-    positions_.resize(start.positions().size());
-  }
-  bool step() override {
-    batch_.step();
-    return batch_.summary().frozen == 0;
-  }
-  Energy energy() override {
-    const auto seen = batch_.observe();
-    return {static_cast<double>(seen.energies()(0, 0)), static_cast<double>(seen.energies()(0, 1))};
-  }
-  std::optional<Momentum> momentum() override { return std::nullopt; }
-  std::span<const double> positions() override {
-    Eigen::Map<Eigen::VectorXd>(positions_.data(), static_cast<Eigen::Index>(positions_.size())) =
-        batch_.positions().instance(0).cast<double>();
-    return positions_;
-  }
-  std::int64_t evaluations() const override { return batch_.summary().evaluations; }
-  std::string failure() const override { return batch_.describe(0); }
-
- private:
-  static BatchOptions batch_options(const Options& options) {
-    BatchOptions result;
-    result.step = options.step;
-    result.gravity = options.gravity;
-    result.threads = 1;
-    return result;
-  }
-  FloatBatch batch_;
-  std::vector<double> positions_;
-};
-
-std::unique_ptr<Mover> mover_of(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance) {
-  Options options = setup.options;
-  options.step = step;
-  options.order = method.kind == Kind::composed ? method.order : 2;
-  if (tolerance > 0) options.tolerance = tolerance;
-  switch (method.kind) {
-    case Kind::rk4: return std::make_unique<BaselineMover>(setup, Scheme::rk4, options);
-    case Kind::semi_implicit_euler: return std::make_unique<BaselineMover>(setup, Scheme::semi_implicit_euler, options);
-    case Kind::single: return std::make_unique<SingleMover>(setup, options);
-    default: return std::make_unique<ComposedMover>(setup, options);
-  }
 }
 
 /// A run of whole samples, `every` seconds apart.
@@ -165,7 +61,8 @@ struct Motion {
 class Measurement {
  public:
   Measurement(const AccuracySetup& setup, const std::function<bool(double)>& go_on)
-      : setup_(setup), go_on_(go_on), begin_(Clock::now()) {
+      : setup_(setup), go_on_(go_on), begin_(Clock::now()), methods_(methods_for(setup.effects)),
+        reversible_(irreversible(setup.effects).empty()), smooth_(sudden(setup.effects).empty()) {
     figures_.asked = setup.duration;
     every_ = kLargest * setup.options.step;
     while (every_ > setup.duration / 4 && every_ > setup.options.step) every_ /= 2;
@@ -206,7 +103,7 @@ class Measurement {
     // sub-steps of the reference, and of all methods down to the step of the options, in units of the duration over that step
     constexpr double reference = 17, rows = 2 * 37;
     const Motion pilot =
-        run(kMethods[0], h, setup_.options.tolerance, 0.02 * setup_.budget, 8, [](std::int64_t) { return false; });
+        run(kOrder2, h, setup_.options.tolerance, 0.02 * setup_.budget, 8, [](std::int64_t) { return false; });
     const double each = pilot.steps > 0 ? pilot.seconds / static_cast<double>(pilot.steps) : 0;
     double duration = setup_.duration;
     if (each > 0) duration = std::min(duration, 0.7 * setup_.budget * h / (each * (reference + rows)));
@@ -221,11 +118,13 @@ class Measurement {
     motion.energy = EnergyDrift(count + 1);
     const auto look = [&] {
       const Energy energy = mover->energy();
-      motion.energy.add(static_cast<double>(motion.samples) * every_, energy);
+      // what effects took is still part of the account; who does not count it has none
+      const Energy account{energy.kinetic, energy.potential + (reversible_ ? 0 : mover->gone())};
+      motion.energy.add(static_cast<double>(motion.samples) * every_, account);
       if (motion.momentum) motion.momentum->add(static_cast<double>(motion.samples) * every_, *mover->momentum(), energy);
       if (keep(motion.samples)) motion.positions.emplace_back(mover->positions().begin(), mover->positions().end());
     };
-    if (const auto first = mover->momentum()) {
+    if (const auto first = mover->momentum(); first && !act_from_outside(setup_.effects)) {
       motion.momentum = MomentumDrift::of(*setup_.model, setup_.options.gravity, 0, mover->positions(), *first);
     }
     look();
@@ -281,17 +180,38 @@ class Measurement {
     std::int64_t judged = 0;
     double gap = 0, gap_at_end = 0;
   };
-  Agreement agreement(const Motion& a, const Motion& b) const {
+  Agreement agreement(const Motion& a, const Motion& b, double judged = kJudged) const {
     Agreement result;
     const std::size_t both = std::min(a.positions.size(), b.positions.size());
     for (std::size_t k = 0; k < both; ++k) {
       result.gap_at_end = std::max(result.gap_at_end, gap(a.positions[k], b.positions[k]));
-      if (result.gap_at_end > kJudged) continue;
+      if (result.gap_at_end > judged) continue;
       result.judged = static_cast<std::int64_t>(k);
       result.gap = result.gap_at_end;
     }
     if (static_cast<std::int64_t>(both) <= samples()) result.gap_at_end = std::numeric_limits<double>::infinity();
     return result;
+  }
+
+  /// The motion of order 2 with its leading error taken away by that of twice the step: of order 4, and independent of RK4.
+  Motion extrapolated(Motion fine, const Motion& coarse) const {
+    const std::size_t both = std::min(fine.positions.size(), coarse.positions.size());
+    for (std::size_t k = 0; k < both; ++k) {
+      for (std::size_t row = 0; row < fine.positions[k].size(); ++row) {
+        fine.positions[k][row] += (fine.positions[k][row] - coarse.positions[k][row]) / 3;
+      }
+    }
+    fine.positions.resize(both);
+    return fine;
+  }
+
+  Motion reference_run(const AccuracyMethod& method, double step, double until) {
+    const auto all = [](std::int64_t) { return true; };
+    Motion motion = run(method, step, kReferenceTolerance, until, samples(), all);
+    if (method != kOrder2 || motion.stopped || !motion.failure.empty()) return motion;
+    Motion coarse = run(method, 2 * step, kReferenceTolerance, until, samples(), all);
+    if (coarse.stopped || !coarse.failure.empty()) return coarse;
+    return extrapolated(std::move(motion), coarse);
   }
 
   /// Halves the step until the motion changes no more against `other` (null: against itself) or the time is up. Nothing where no
@@ -303,7 +223,7 @@ class Measurement {
     for (double h = step; h > 0.99 * smallest; h /= 2) {
       const double begin = elapsed();
       if (best && begin + 2.2 * taken > until) break;
-      Motion motion = run(method, h, kReferenceTolerance, until, samples(), [](std::int64_t) { return true; });
+      Motion motion = reference_run(method, h, until);
       taken = elapsed() - begin;
       if (motion.stopped) break;
       const bool reached = motion.failure.empty();
@@ -334,33 +254,68 @@ class Measurement {
   void find_reference() {
     AccuracyReference& reference = figures_.reference;
     const double h = setup_.options.step;
-    reference.step = std::min(4 * h, every_);
-    reference.rk4_step = h;
+    if (!smooth_) return find_reference_alone();
+    reference.method = reversible_ ? kOrder8 : kOrder2;
+    reference.other = kRk4;
+    reference.step = reversible_ ? std::min(4 * h, every_) : std::min(h, every_ / 2);
+    reference.other_step = h;
+    const double smallest = reversible_ ? kSmallest : kSmallestOfRk4;
     std::optional<Motion> ours =
-        refined(kMethods[3], reference.step, kSmallest * h, elapsed() + kReferenceShare * setup_.budget, nullptr);
+        refined(reference.method, reference.step, smallest * h, elapsed() + kReferenceShare * setup_.budget, nullptr);
     if (!ours) {
-      reference.failure = "no run of order 8 came to its end";
+      reference.failure = fmt::format("no run of {} came to its end", name(reference.method));
       return;
     }
     const std::optional<Motion> theirs =
-        refined(kMethods[4], reference.rk4_step, kSmallestOfRk4 * h, elapsed() + kReferenceShare * setup_.budget, &*ours);
+        refined(kRk4, reference.other_step, kSmallestOfRk4 * h, elapsed() + kReferenceShare * setup_.budget, &*ours);
     if (!theirs) {
       reference.failure = "no run of RK4 came to its end";
       return;
     }
-    const Agreement found = agreement(*ours, *theirs);
-    reference.gap_at_end = found.gap_at_end;
-    const bool agreed = found.gap_at_end <= kAgreed;
-    judged_ = agreed ? samples() : found.judged;
-    reference.gap = agreed ? found.gap_at_end : found.gap;
-    reference.horizon = static_cast<double>(judged_) * every_;
-    reference.kinetic = ours->energy.scale();
-    if (judged_ == 0) {
-      reference.failure =
-          fmt::format("order 8 and RK4 part within {:.3g} s, at the smallest steps that the time allowed", every_);
+    judge(std::move(*ours), agreement(*ours, *theirs), kAgreed);
+  }
+
+  /// Where no other method knows the effects: order 2 against itself at twice the step.
+  void find_reference_alone() {
+    AccuracyReference& reference = figures_.reference;
+    const double until = elapsed() + 2 * kReferenceShare * setup_.budget;
+    reference.method = reference.other = kOrder2;
+    std::optional<Motion> last, before;
+    double taken = 0;
+    for (double h = std::min(setup_.options.step, every_); h > 0.99 * kSmallestAlone * setup_.options.step; h /= 2) {
+      const double begin = elapsed();
+      if (before && begin + 2.2 * taken > until) break;
+      Motion motion = run(kOrder2, h, kAloneTolerance, until, samples(), [](std::int64_t) { return true; });
+      taken = elapsed() - begin;
+      if (motion.stopped) break;
+      if (!motion.failure.empty()) continue;
+      before = std::move(last);
+      last = std::move(motion);
+      reference.other_step = reference.step;
+      reference.step = h;
+    }
+    if (!before) {
+      reference.failure = "no two runs of order 2 came to their end";
       return;
     }
-    truth_ = std::move(ours->positions[static_cast<std::size_t>(judged_)]);
+    const Agreement found = agreement(*last, *before, kJudgedAlone);
+    judge(std::move(*last), found, kJudgedAlone);
+  }
+
+  void judge(Motion ours, const Agreement& found, double agreed) {
+    AccuracyReference& reference = figures_.reference;
+    reference.gap_at_end = found.gap_at_end;
+    const bool over_all = found.gap_at_end <= agreed;
+    judged_ = over_all ? samples() : found.judged;
+    reference.gap = over_all ? found.gap_at_end : found.gap;
+    reference.horizon = static_cast<double>(judged_) * every_;
+    reference.kinetic = ours.energy.scale();
+    if (judged_ == 0) {
+      reference.failure = fmt::format("{} and {} part within {:.3g} s, at the smallest steps that the time allowed", name(reference.method),
+                                      name(reference.other), every_);
+      return;
+    }
+    truth_ = std::move(ours.positions[static_cast<std::size_t>(judged_)]);
   }
 
   AccuracyRow row(const AccuracyMethod& method, double step, double tolerance) {
@@ -408,32 +363,33 @@ class Measurement {
   }
 
   void ladder() {
-    std::vector<double> before(std::size(kMethods), 0.0);
+    std::vector<double> before(methods_.size(), 0.0);
     double step = every_;
     for (int k = 0; k < kLadder; ++k, step /= 2) {
-      for (std::size_t m = 0; m < std::size(kMethods); ++m) {
-        const bool solves = kMethods[m].kind == Kind::composed;
-        add(kMethods[m], step, solves ? default_tolerance(kMethods[m].order) : 0, before[m], true);
+      for (std::size_t m = 0; m < methods_.size(); ++m) {
+        const bool solves = methods_[m].kind == Kind::composed;
+        add(methods_[m], step, solves ? default_tolerance(methods_[m].order) : 0, before[m], true);
       }
     }
-    std::ranges::stable_sort(figures_.rows, {}, [&](const AccuracyRow& one) {
-      return std::ranges::find(kMethods, one.method) - std::begin(kMethods);
-    });
+    std::ranges::stable_sort(figures_.rows, {},
+                             [&](const AccuracyRow& one) { return std::ranges::find(methods_, one.method) - methods_.begin(); });
   }
 
   void others() {
     double before = 0;
     const double step = std::min(every_, setup_.options.step);
-    for (const int order : {2, 6}) {
-      for (const double tolerance : kTolerances) add({Kind::composed, order}, step, tolerance, before = 0, false);
+    for (const AccuracyMethod& method : methods_) {
+      if (method.kind != Kind::composed || (method.order != 2 && method.order != 6)) continue;
+      for (const double tolerance : kTolerances) add(method, step, tolerance, before = 0, false);
     }
-    const bool plain = setup_.effects.armature.empty() && setup_.effects.springs.empty() && setup_.effects.ball_springs.empty();
-    if (plain) add({Kind::single, 2}, step, 0, before = 0, false);
+    add({Kind::single, 2}, step, 0, before = 0, false);
   }
 
   const AccuracySetup& setup_;
   const std::function<bool(double)>& go_on_;
   Clock::time_point begin_;
+  std::vector<AccuracyMethod> methods_;
+  bool reversible_, smooth_;  // what all effects are
   double every_;  // [s] between samples, the largest step
   bool interrupted_ = false;
   std::int64_t judged_ = 0;  // the sample at the horizon
@@ -454,59 +410,12 @@ std::string name(const AccuracyMethod& method) {
 
 AccuracyFigures measure_accuracy(const AccuracySetup& setup, const std::function<bool(double)>& go_on) {
   check(setup.options);
-  if (const std::string refused = irreversible(setup.effects); !refused.empty()) {
-    throw InputError(
-        fmt::format("accuracy compares methods of which most know gravity, armature and springs alone; the scene has {}: leave "
-                    "{} out to learn what its motion between contacts and losses takes",
-                    refused, refused.find(',') == refused.npos ? "it" : "them"));
-  }
   return Measurement(setup, go_on).figures();
 }
 
 AccuracyRow measure_energy(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance,
                            double kinetic) {
   return Measurement(setup, [](double) { return true; }).energy(method, step, tolerance, kinetic);
-}
-
-std::vector<AccuracyFit> accuracy_fits(const AccuracyFigures& figures) {
-  constexpr double kCoarse = 0.01, kCoarseOfLowOrder = 0.1, kFloor = 1e-13, kFalls = 1.6;
-  constexpr std::size_t kRows = 3;
-  std::vector<AccuracyFit> fits;
-  for (const AccuracyMethod& method : kMethods) {
-    // as long as the error falls, from large steps to small; where it falls no more it is rounding's, and ten times that is near
-    // it
-    std::vector<const AccuracyRow*> rows;
-    double floor = std::max(kFloor, figures.reference.gap);
-    for (const AccuracyRow& row : figures.rows) {
-      if (row.method != method || !row.of_ladder || !row.done()) continue;
-      if (!(row.error < (method.order > 2 ? kCoarse : kCoarseOfLowOrder)) || row.split_steps > 0) {
-        rows.clear();
-        continue;
-      }
-      if (!rows.empty() && row.error * kFalls > rows.back()->error) {
-        floor = std::max(floor, row.error);
-        break;
-      }
-      rows.push_back(&row);
-    }
-    std::erase_if(rows, [&](const AccuracyRow* row) { return row->error < 10 * floor; });
-    if (rows.size() > kRows) rows.erase(rows.begin(), rows.end() - kRows);
-    AccuracyFit fit{method, kUnknown, 0, 0, static_cast<int>(rows.size())};
-    LineFit line;
-    for (const AccuracyRow* row : rows) line.add(std::log(row->step), std::log(row->error));
-    if (rows.size() == kRows) fit = {method, line.slope(), rows.front()->step, rows.back()->step, fit.rows};
-    fits.push_back(fit);
-  }
-  return fits;
-}
-
-const AccuracyRow* cheapest(const AccuracyFigures& figures, double AccuracyRow::*value, double target, bool ours) {
-  const AccuracyRow* best = nullptr;
-  for (const AccuracyRow& row : figures.rows) {
-    if (!row.of_ladder || !row.done() || !(row.*value <= target) || (row.method.kind == Kind::composed) != ours) continue;
-    if (best == nullptr || row.seconds < best->seconds) best = &row;
-  }
-  return best;
 }
 
 }  // namespace linden

@@ -2,18 +2,22 @@
 // What accuracy costs on one scene: every method over a ladder of steps, against a reference that two independent methods agree
 // on.
 //
-//   methods    orders 2, 4, 6, 8 of linden; RK4 and semi-implicit Euler, as other engines step (engine/baseline.hpp)
+//   methods    orders 2, 4, 6, 8 of linden; RK4 and semi-implicit Euler, as other engines step (engine/baseline.hpp). Scenes with
+//              damping, servos, torques, wrenches or drag have no orders above 2; with friction, limits or ground there is but
+//              order 2
 //   steps      16, 8, 4, 2, 1, 1/2, 1/4 times the step of the options
 //   also       the solver's tolerance from 1e-6 to 1e-12 for orders 2 and 6, and order 2 in single precision, all at the step of
 //              the options
 //   reference  order 8 and RK4, their steps halved until they change no more, are 1/8 and 1/32 of the options' or their share of
 //              the budget is spent. Where they agree to kAgreed over the whole duration errors are judged at its end. Where they
 //              do not the motion is chaotic as far as anybody can tell: errors are judged at the horizon, the last time to which
-//              they agree to kJudged, and beyond it energy alone is.
+//              they agree to kJudged, and beyond it energy alone is. Without higher orders order 2 takes the place of order 8, its
+//              leading error taken away by a run at twice the step; where there is order 2 alone it is compared with itself at twice
+//              the step, and judged to kJudgedAlone.
 //   error      largest difference of a coordinate to the reference [rad, m]; of a quaternion twice its components', an angle.
 //              Never less than what the two references leave open.
 //   energy     band max H - min H and slope of H, sampled every largest step, relative to the largest kinetic energy of the
-//              reference
+//              reference; with effects that take or give energy of H + taken - given, where a method keeps that account
 //   time       CPU time of the steps alone, of this thread
 //   budget     the clock's seconds for everything. Rows go from large steps to small; what no longer fits is left out and said
 //              so. Where not even a reference would fit the duration is cut.
@@ -70,7 +74,8 @@ struct AccuracyRow {
 };
 
 struct AccuracyReference {
-  double step = 0, rk4_step = 0;   // of the finest of each
+  AccuracyMethod method, other;    // both alike: nobody else knows the scene's effects
+  double step = 0, other_step = 0;  // of the finest of each
   double horizon = 0;              // [s]
   double gap = 0, gap_at_end = 0;  // between the two, up to the horizon and over all [rad, m]
   double kinetic = 0;              // largest [J]

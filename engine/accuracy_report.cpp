@@ -22,8 +22,8 @@ std::string short_number(double value) { return std::isfinite(value) ? fmt::form
 std::string reference_text(const AccuracyFigures& figures) {
   const AccuracyReference& reference = figures.reference;
   if (!reference.failure.empty()) return reference.failure;
-  const std::string steps =
-      fmt::format("order 8 at {} ms and RK4 at {} ms", milliseconds(reference.step), milliseconds(reference.rk4_step));
+  const std::string steps = fmt::format("{} at {} ms and {} at {} ms", name(reference.method), milliseconds(reference.step),
+                                        name(reference.other), milliseconds(reference.other_step));
   if (!figures.chaotic()) return fmt::format("{} agree to {:.1e} over all {:.6g} s", steps, reference.gap, figures.duration);
   return fmt::format("{} agree to {:.1e} up to {:.4g} s", steps, reference.gap, reference.horizon);
 }
@@ -106,6 +106,9 @@ std::string accuracy_summary(const AccuracyArguments& arguments, const AccuracyS
   row("reference", reference_text(figures));
   if (figures.chaotic() && figures.reference.failure.empty()) {
     row("", "beyond that they part, as on a chaotic motion: errors are judged there, and what comes later by its energy");
+  }
+  if (figures.reference.method == figures.reference.other && figures.reference.failure.empty()) {
+    row("", "no other method knows this scene's effects: order 2 is judged by its own run at the smallest step");
   }
   if (figures.rows.empty()) return text;
 
@@ -205,8 +208,10 @@ nlohmann::ordered_json accuracy_json(const AccuracyArguments& arguments, const A
       {"duration_asked", figures.asked},
       {"duration", figures.duration},
       {"reference",
-       {{"order_8_step", reference.step},
-        {"rk4_step", reference.rk4_step},
+       {{"method", name(reference.method)},
+        {"step", reference.step},
+        {"other_method", name(reference.other)},
+        {"other_step", reference.other_step},
         {"horizon", if_any(judged, reference.horizon)},
         {"gap", if_any(judged, reference.gap)},
         {"gap_at_end", if_any(judged, reference.gap_at_end)},

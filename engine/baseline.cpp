@@ -17,6 +17,7 @@
 #include "kernels/motion_map.hpp"
 #include "kernels/placement_map.hpp"
 #include "kernels/velocity_down.hpp"
+#include "kernels/world_placement_down.hpp"
 #include "layout/input_error.hpp"
 
 namespace linden {
@@ -47,14 +48,15 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
       plan_(*model_, options, effects),
       ties_(model_->mimics, model_->tree.shape.velocities) {
   check(options);
-  if (const std::string refused = irreversible(effects); !refused.empty()) {
-    throw InputError(fmt::format("{} knows gravity, armature and springs alone; the scene has {}", name(scheme), refused));
+  if (const std::string refused = sudden(effects); !refused.empty()) {
+    throw InputError(fmt::format("{} has no forces that change suddenly; the scene has {}", name(scheme), refused));
   }
   const Shape& shape = model_->tree.shape;
   for (Field<double>* field : {&q_, &good_q_}) field->allocate(shape.positions);
   for (Field<double>* field : {&v_, &good_v_, &stage_u_, &stage_v_, &rate_u_, &rate_v_, &sum_u_, &sum_v_})
     field->allocate(shape.velocities);
   work_.allocate(shape);
+  if (plan_.bodies) pose_.allocate(shape.slots);
   std::ranges::copy(model_->neutral(), q_.flat().begin());
 }
 
@@ -94,13 +96,51 @@ void Baseline::place() {
   }
 }
 
-void Baseline::accelerate(const Field<double>& v, Field<double>& a) {
+void Baseline::drive(double time, const Field<double>& v) {
+  const Effects& effects = plan_.effects;
+  for (const JointDamping& damper : effects.damping) work_.force(damper.row) -= damper.coefficient * v(damper.row);
+  for (const Servo& servo : effects.servos) {
+    work_.force(servo.row) += servo.stiffness * (servo.target - q_(plan_.q_row(servo.row))) - servo.damping * v(servo.row);
+  }
+  for (const JointTorque& torque : effects.torques) work_.force(torque.row) += torque.force.at(time);
+}
+
+void Baseline::push_bodies(double time) {
+  world_placement_down(model_->tree, work_.placement, pose_);
+  const auto vector = [](const std::array<double, 3>& from) { return Vec3<double>{from[0], from[1], from[2]}; };
+  const auto push = [&](Index slot, const Vec3<double>& point, const Vec3<double>& force, const Vec3<double>& moment) {
+    const Wrench<double> wrench{moment + cross(point, force), force};
+    store(work_.impulse, slot, load<Wrench, double>(work_.impulse, slot) - wrench);
+  };
+  for (const BodyWrench& wrench : plan_.effects.wrenches) {
+    Vec3<double> force = share_at(wrench, time) * vector(wrench.force), moment = share_at(wrench, time) * vector(wrench.moment);
+    if (wrench.in_world) {
+      const auto R = load<Placement, double>(pose_, wrench.slot).R;
+      force = transpose_times(R, force);
+      moment = transpose_times(R, moment);
+    }
+    push(wrench.slot, vector(wrench.point), force, moment);
+  }
+  for (const Drag& drag : plan_.effects.drag) {
+    const auto G = load<Inertia, double>(model_->constants.inertia, drag.slot);
+    const Vec3<double> c = G.m > 0 ? (1 / G.m) * G.mc : Vec3<double>{0, 0, 0};
+    const auto V = load<Twist, double>(work_.twist, drag.slot);
+    const Vec3<double> air = transpose_times(load<Placement, double>(pose_, drag.slot).R, vector(plan_.effects.wind));
+    const Vec3<double> through = V.v + cross(V.w, c) - air;
+    const double b = drag.linear + drag.quadratic * std::sqrt(dot(through, through));
+    push(drag.slot, c, -b * through, {0, 0, 0});
+  }
+}
+
+void Baseline::accelerate(double time, const Field<double>& v, Field<double>& a) {
   const Tree& tree = model_->tree;
   const BodyConstants<double>& constants = model_->constants;
   evaluations_ += 1;
   place();
+  drive(time, v);
   velocity_down(tree, constants, work_.placement, v, work_.twist);
   coriolis_down(tree, constants, work_.placement, v, work_.twist, work_.bias, work_.impulse);
+  if (plan_.bodies) push_bodies(time);
   impulse_up(tree, constants, work_.placement, work_.impulse, work_.residual);
   for (Index row = 0; row < v.rows(); ++row) work_.residual(row) = work_.force(row) - work_.residual(row);
   fold_mimics(ties_.mimics(), work_.residual);
@@ -145,7 +185,7 @@ void Baseline::chart_rate(const Field<double>& u, const Field<double>& v, Field<
 }
 
 void Baseline::euler_step() {
-  accelerate(v_, rate_v_);
+  accelerate(time(), v_, rate_v_);
   add(v_, options_.step, rate_v_, v_);
   for (Index row = 0; row < v_.rows(); ++row) stage_u_(row) = options_.step * v_(row);
   move(good_q_, stage_u_);
@@ -156,14 +196,14 @@ void Baseline::rk4_step() {
   const double h = options_.step;
   for (int k = 0; k < 4; ++k) {
     if (k == 0) {
-      accelerate(v_, rate_v_);
+      accelerate(time(), v_, rate_v_);
       std::ranges::copy(v_.flat(), rate_u_.flat().begin());
     } else {
       for (Index row = 0; row < v_.rows(); ++row) stage_u_(row) = h * node[k] * rate_u_(row);
       add(v_, h * node[k], rate_v_, stage_v_);
       move(good_q_, stage_u_);
       chart_rate(stage_u_, stage_v_, rate_u_);
-      accelerate(stage_v_, rate_v_);
+      accelerate(time() + h * node[k], stage_v_, rate_v_);
     }
     for (Index row = 0; row < v_.rows(); ++row) {
       sum_u_(row) = (k == 0 ? 0 : sum_u_(row)) + h * weight[k] * rate_u_(row);

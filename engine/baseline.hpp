@@ -8,7 +8,8 @@
 // Positions of ball and free joints move along exp of a body twist. RK4 takes its stages in the coordinates of that exp, u' = v
 // + 1/2 [u, v] + 1/12 [u, [u, v]], without which it would be of second order there (Munthe-Kaas).
 //
-// acts    gravity, armature, springs and ball springs; whatever else a scene has is refused
+// acts    gravity, armature, springs, damping, servos, torques, wrenches and drag, each as the force that it is at the time of an evaluation;
+//         friction, limits, servos with limited force and ground are refused: their forces change suddenly
 // cost    an evaluation is some 150 ns a body, as much as a step of order 2 takes: placements, velocities, forces up, factor up,
 //         accelerations down
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3; Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8
@@ -56,7 +57,11 @@ class Baseline {
  private:
   /// Placements and forces at q_.
   void place();
-  void accelerate(const Field<double>& v, Field<double>& a);
+  /// Of effects, on top of those of place(), at the time of an evaluation.
+  void drive(double time, const Field<double>& v);
+  /// Wrenches and drag on bodies, taken from work_.impulse.
+  void push_bodies(double time);
+  void accelerate(double time, const Field<double>& v, Field<double>& a);
   /// M(q) v into work_.residual; the system's momentum into slot 0 of work_.impulse.
   void find_momentum(const Field<double>& v);
   /// q_ <- from (+) u
@@ -75,6 +80,7 @@ class Baseline {
   Field<double> q_, v_, good_q_, good_v_;
   Field<double> stage_u_, stage_v_, rate_u_, rate_v_, sum_u_, sum_v_;
   Field<double, 36> none_;  // no pull on any body
+  Field<double, 12> pose_;  // of bodies in the world, where something acts on them
   Workspace<double> work_;
   MimicTies<double> ties_;
 };

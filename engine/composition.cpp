@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -56,6 +58,17 @@ std::string irreversible(const Effects& effects) {
   refuse(!effects.drag.empty(), "drag");
   refuse(effects.ground.has_value(), "ground");
   return fmt::format("{}", fmt::join(refused, ", "));
+}
+
+std::string sudden(const Effects& effects) {
+  std::vector<std::string_view> found;
+  if (!effects.friction.empty()) found.push_back("friction");
+  if (!effects.limits.empty()) found.push_back("limits");
+  if (std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); })) {
+    found.push_back("servo with limited force");
+  }
+  if (effects.ground) found.push_back("ground");
+  return fmt::format("{}", fmt::join(found, ", "));
 }
 
 void check_order(int order, const Effects& effects) {

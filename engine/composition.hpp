@@ -27,6 +27,10 @@ std::span<const double> composition(int order);
 /// The effects of a scene that cannot be taken back in time, by name, with commas: all but armature and springs. Empty: none.
 std::string irreversible(const Effects& effects);
 
+/// Those of them whose force changes suddenly with the motion, so that no explicit method has them: friction, limits, servos with limited
+/// force, ground.
+std::string sudden(const Effects& effects);
+
 /// Throws InputError where the order is above 2 and an effect cannot be taken back in time.
 void check_order(int order, const Effects& effects);
 

@@ -76,12 +76,6 @@ void begin_run(const RunArguments& arguments, Simulation& simulation) {
   if (!state.velocities.empty()) simulation.set_velocities(state.velocities);
 }
 
-/// Whether an effect takes momentum out of the system or brings it in.
-bool acts_from_outside(const RunArguments& arguments) {
-  const Effects effects = arguments.effects();
-  return !effects.wrenches.empty() || !effects.drag.empty() || effects.ground;
-}
-
 /// One run from its first sample to its files.
 class Execution {
  public:
@@ -90,7 +84,7 @@ class Execution {
     figures_.sampled_every = arguments.record.empty() ? (steps + kSamples - 1) / kSamples : 1;
     figures_.begin = simulation.time();
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
-    if (!acts_from_outside(arguments)) figures_.momentum = MomentumDrift::of(simulation);
+    if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
     if (!arguments.record.empty()) recorder_.emplace(arguments.record, simulation.model().names);
   }
 

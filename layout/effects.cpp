@@ -452,6 +452,8 @@ std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double
   return list;
 }
 
+bool act_from_outside(const Effects& effects) { return !effects.wrenches.empty() || !effects.drag.empty() || effects.ground; }
+
 void check(const Effects& effects, const Model& model) { Checker(effects, model).run(); }
 
 }  // namespace linden

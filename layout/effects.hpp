@@ -164,6 +164,9 @@ std::vector<JointDamping> on_leaders(const Model& model, const std::vector<Joint
 std::vector<JointFriction> on_leaders(const Model& model, const std::vector<JointFriction>& list);
 std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLimit>& list);
 
+/// Whether one takes momentum out of the system or brings it in: wrenches, drag, ground.
+bool act_from_outside(const Effects& effects);
+
 /// Throws InputError where an effect names what is not there or cannot have it (a row out of range, a screw's effect on a ball or
 /// free joint or on a mimic joint's follower), holds a number that makes no sense, or meets another of its kind where there can be
 /// only one: friction, limits and servos.

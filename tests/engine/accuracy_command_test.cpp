@@ -128,6 +128,51 @@ TEST_CASE("a scene brings its start and its springs into the study", "[command l
   CHECK(ladder(json, "order 2")[4]["error"] < 1e-3);
 }
 
+TEST_CASE("a scene that loses energy smoothly is judged against RK4 and order 2 without its leading error", "[command line]") {
+  const Shell shell;
+  shell.write("s.yaml",
+              "model: chain:3\nduration: 0.32\nstep: 2e-3\ninitial: {positions: {joint1: 0.5, joint2: -0.4}}\n"
+              "effects:\n  gravity: [0, 0, -9.81]\n  damping: 0.002\n  servo: {stiffness: 0.5, damping: 0.01, joints: [joint2], targets: {joint2: 0.3}}\n"
+              "  torque: {joint1: {times: [0, 0.4], values: [0.1, -0.1]}}\n"
+              "  drag: {bodies: {link3: {linear: 0.01, quadratic: 0.05}}}\n"
+              "  wrench: {link2: {force: [0.1, 0, 0.2], moment: [0, 0.01, 0]}}\n");
+  const Outcome outcome = shell.linden("accuracy s.yaml --budget 60 --json a.json");
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == 0);
+  CHECK_THAT(outcome.out, Contains("order 2 at ") && Contains(" and RK4 at ") && Contains("agree to"));
+  const nlohmann::json json = json_of(shell / "a.json");
+  CHECK(json["reference"]["gap"] < 1e-8);
+  CHECK(json["chaotic"] == false);
+  CHECK(ladder(json, "order 4").empty());
+  for (const nlohmann::json& fit : json["fits"]) {
+    INFO(fit);
+    REQUIRE(fit["order"].is_number());
+    CHECK(fit["order"].get<double>() == Approx(fit["nominal_order"].get<double>()).margin(0.3));
+  }
+  const std::vector<nlohmann::json> ours = ladder(json, "order 2");
+  CHECK(ours[6]["energy_band"] < 0.1 * ours[4]["energy_band"].get<double>());  // H + taken - given
+  CHECK(ladder(json, "RK4")[6]["energy_band"].is_null());
+}
+
+TEST_CASE("a scene with contacts is judged against itself at a smaller step, and says so", "[command line]") {
+  const Shell shell;
+  shell.write("s.yaml",
+              "model: chain:2\nduration: 0.4\nstep: 2e-3\ninitial: {positions: {joint1: 0.5}}\n"
+              "effects: {gravity: [0, 0, -9.81], friction: 0.02, limits: {joint1: {lower: -0.4, upper: 1}}}\n");
+  const Outcome outcome = shell.linden("accuracy s.yaml --budget 60 --json a.json");
+  INFO(outcome.err);
+  REQUIRE(outcome.exit_code == 0);
+  CHECK_THAT(outcome.out, Contains("no other method knows this scene's effects"));
+  const nlohmann::json json = json_of(shell / "a.json");
+  CHECK(json["reference"]["method"] == json["reference"]["other_method"]);
+  CHECK(json["reference"]["step"].get<double>() < json["reference"]["other_step"].get<double>());
+  const std::vector<nlohmann::json> ours = ladder(json, "order 2");
+  CHECK(ours.size() == 7);
+  CHECK(ours[6]["error"] < 0.2 * ours[1]["error"].get<double>());
+  CHECK(json["rows"].back()["method"] == "order 2, single");
+  CHECK_THAT(outcome.out, Contains("for an error of 1e-03"));
+}
+
 TEST_CASE("an interrupted study keeps the rows that are done", "[command line]") {
   const Shell shell;
   const Outcome outcome = shell.linden("accuracy chain:50 --duration 5 --budget 100 --json a.json", "timeout --signal INT 2");
@@ -138,9 +183,7 @@ TEST_CASE("an interrupted study keeps the rows that are done", "[command line]")
 
 TEST_CASE("what a study of accuracy cannot be is refused in one line", "[command line]") {
   const Shell shell;
-  shell.write("damped.yaml", "model: chain:2\neffects: {damping: 0.1}\n");
   check_refused(shell, "accuracy", "MODEL");
-  check_refused(shell, "accuracy damped.yaml", "the scene has damping");
   check_refused(shell, "accuracy chain:2 --budget 0", "--budget 0");
   check_refused(shell, "accuracy chain:2 --budget many", "--budget");
   check_refused(shell, "accuracy chain:2 --duration 0", "--duration");

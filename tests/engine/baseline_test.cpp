@@ -90,7 +90,8 @@ TEST_CASE("semi-implicit Euler blows up on the ten-link chain, and the step that
 TEST_CASE("what a baseline does not have is refused") {
   const auto arm = std::make_shared<const Model>(load_urdf(model_file("arm.urdf")));
   Effects effects;
-  effects.damping = damping_everywhere(*arm, 1);
+  effects.friction = urdf_friction(*arm);
+  REQUIRE(!effects.friction.empty());
   CHECK_THROWS_AS(Baseline(arm, Scheme::rk4, {}, effects), InputError);
   Baseline baseline(arm, Scheme::rk4, {});
   CHECK_THROWS_WITH(baseline.set(std::vector<double>(3), std::vector<double>(3)), Catch::Contains("expected"));
