@@ -28,6 +28,7 @@
 
 #include "bench/comparators/integrator.hpp"
 #include "bench/machine.hpp"
+#include "engine/baseline.hpp"
 #include "engine/output_file.hpp"
 #include "engine/plot.hpp"
 #include "engine/simulation.hpp"
@@ -41,7 +42,6 @@ using comparators::Evaluation;
 using comparators::Guess;
 using comparators::Integrator;
 using comparators::RootFinding;
-using comparators::SemiImplicitEuler;
 using comparators::Settings;
 using comparators::Solved;
 using plot::Chart;
@@ -130,11 +130,12 @@ void energy(const Place& place) {
   const Model model = paper_chain(kLinks);
   const std::vector<double> zero(kLinks, 0.0);
 
-  SemiImplicitEuler euler(model, kStep, g);
+  const Options options{.step = kStep, .gravity = {g.x, g.y, g.z}};
+  Baseline euler(std::make_shared<const Model>(model), Scheme::semi_implicit_euler, options);
   Settings settings{.step = kStep, .gravity = g};
   settings.stop.tolerance = paper_tolerance(kLinks);
   Integrator riqn(model, settings);
-  Simulation simulation(model, {.step = kStep, .gravity = {g.x, g.y, g.z}});
+  Simulation simulation(model, options);
   euler.set(zero, zero);
   riqn.set(zero, zero);
 
@@ -143,13 +144,13 @@ void energy(const Place& place) {
   std::string csv = "time_s,semi_implicit_euler_J,riqn_J,linden_default_J\n";
   for (int frame = 0; frame <= kEnergyFrames; ++frame) {
     if (frame > 0) {
-      euler.step();
+      if (!euler.step()) throw std::runtime_error(fmt::format("figure 2b: Euler is not finite in frame {}", frame));
       if (!riqn.step().converged) throw std::runtime_error(fmt::format("figure 2b: RIQN does not converge in frame {}", frame));
       if (const StepReport report = simulation.step(); !report.ok()) throw std::runtime_error(simulation.describe(report));
     }
     if (frame % kEvery != 0) continue;
     time.push_back(kStep * frame);
-    of_euler.push_back(euler.energy());
+    of_euler.push_back(euler.energy().total());
     of_riqn.push_back(riqn.energy());
     of_default.push_back(simulation.energy().total());
     if (frame % kInTable != 0) continue;

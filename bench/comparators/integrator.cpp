@@ -131,32 +131,4 @@ const Field<double>& Integrator::velocities() {
 
 double Integrator::energy() { return 0.5 * vector(velocities()).dot(vector(state_.p)) + potential_; }
 
-SemiImplicitEuler::SemiImplicitEuler(const Model& model, double step, Vec3d gravity)
-    : model_(model), step_(step), gravity_(gravity) {
-  check(model);
-  q_.allocate(model.tree.shape.velocities);
-  v_.allocate(model.tree.shape.velocities);
-  work_.allocate(model.tree.shape);
-}
-
-void SemiImplicitEuler::set(std::span<const double> q, std::span<const double> v) {
-  std::ranges::copy(q, q_.flat().begin());
-  std::ranges::copy(v, v_.flat().begin());
-  place();
-}
-
-void SemiImplicitEuler::place() { place_at(model_, q_, gravity_, work_, potential_); }
-
-void SemiImplicitEuler::step() {
-  acceleration(model_, work_, v_, work_.residual);
-  vector(v_) += step_ * vector(work_.residual);
-  vector(q_) += step_ * vector(v_);
-  place();
-}
-
-double SemiImplicitEuler::energy() {
-  apply_mass(model_, work_, v_, work_.residual);
-  return 0.5 * vector(v_).dot(vector(work_.residual)) + potential_;
-}
-
 }  // namespace linden::comparators

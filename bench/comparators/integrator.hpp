@@ -69,23 +69,4 @@ class Integrator {
   std::unique_ptr<RootFinder> root_finder_;
 };
 
-/// Semi-implicit Euler, the step most engines take: v <- v + h M^-1 (Q - C), q <- q + h v. On (q, v) of a tree of screws.
-class SemiImplicitEuler {
- public:
-  SemiImplicitEuler(const Model& model, double step, Vec3d gravity);
-  void set(std::span<const double> q, std::span<const double> v);
-  void step();
-  double energy();
-
- private:
-  void place();
-
-  const Model& model_;
-  double step_;
-  Vec3d gravity_;
-  Field<double> q_, v_;
-  Workspace<double> work_;
-  double potential_ = 0;
-};
-
 }  // namespace linden::comparators
