@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "layout/input_error.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 
@@ -57,7 +58,7 @@ Energy InstanceStepper::observe() {
 
 void normalise_positions(const Model& model, std::span<double> q) {
   for (std::size_t i = 0; i < q.size(); ++i) {
-    if (!std::isfinite(q[i])) throw InputError(fmt::format("position \"{}\" is {}", model.names.position[i], q[i]));
+    if (!std::isfinite(q[i])) throw InputError(fmt::format("position {} is {}", quoted(model.names.position[i]), q[i]));
   }
   const Tree& tree = model.tree;
   for (const Run& run : tree.runs) {
@@ -66,8 +67,8 @@ void normalise_positions(const Model& model, std::span<double> q) {
       const std::span<double> turn = q.subspan(static_cast<std::size_t>(tree.first_q(i) + (run.kind == JointKind::free ? 3 : 0)), 4);
       const double length = std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]);
       if (!(length > 1e-3)) {
-        throw InputError(fmt::format("the quaternion of joint \"{}\" has length {}; expected 1",
-                                     model.names.joint[static_cast<std::size_t>(i)], length));
+        throw InputError(fmt::format("the quaternion of joint {} has length {}; expected 1",
+                                     quoted(model.names.joint[static_cast<std::size_t>(i)]), length));
       }
       for (double& number : turn) number /= length;
     }

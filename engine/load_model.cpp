@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <string_view>
 
 #include "engine/scene_file.hpp"
@@ -41,14 +42,16 @@ void require_memory(const std::string& what, double bytes) {
                                memory_text(static_cast<std::size_t>(present))));
 }
 
-void check_memory(const std::string& name) {
+double memory_of(const std::string& name) {
   constexpr double kBytesPerBody = 2600;  // of building and simulating chain:1000000
   const std::string_view count = std::string_view(name).substr(name.find(':') + 1);
   double bodies = 0;
   std::from_chars(count.data(), count.data() + count.size(), bodies);
   if (name.starts_with("humanoids:")) bodies *= kHumanoidBodies;
-  require_memory(name, bodies * kBytesPerBody);
+  return std::isnan(bodies) ? 0 : bodies * kBytesPerBody;
 }
+
+void check_memory(const std::string& name) { require_memory(name, memory_of(name)); }
 
 Base base_from(const std::string& text) {
   if (text == "fixed") return Base::fixed;

@@ -16,7 +16,10 @@ Model load_model(const std::string& name, std::optional<Base> base);
 /// Throws InputError where `what` needs more bytes than the machine has: asked for too much, Linux ends programs without a word.
 void require_memory(const std::string& what, double bytes);
 
-/// The same for a generated model.
+/// What a generated model takes to build and to simulate [bytes]; 0 where its name holds no number.
+double memory_of(const std::string& name);
+
+/// Throws InputError where the machine has less than that.
 void check_memory(const std::string& name);
 
 /// "fixed" or "floating"; throws InputError for anything else.

@@ -3,19 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string_view>
-#include <system_error>
 
 #include "layout/input_error.hpp"
+#include "layout/text_file.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
 namespace {
-
-constexpr std::size_t kMostBytes = std::size_t{1} << 30;
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");
@@ -24,33 +20,8 @@ std::string_view trimmed(std::string_view text) {
 
 }  // namespace
 
-std::string read_text(const std::string& file, const std::string& what, std::size_t most_bytes) {
-  std::error_code ignored;
-  const std::filesystem::file_status status = std::filesystem::status(file, ignored);
-  if (!std::filesystem::exists(status))
-    throw InputError(fmt::format("{}: there is no such file; expected {}; check the path", file, what));
-  if (std::filesystem::is_directory(status)) {
-    throw InputError(fmt::format("{}: this is a folder; expected {}; name a file in it", file, what));
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw InputError(fmt::format("{}: it cannot be opened; expected {}; check its permissions", file, what));
-  constexpr std::size_t kChunk = 1 << 16;
-  std::string text;
-  while (stream) {
-    const std::size_t before = text.size();
-    text.resize(before + kChunk);
-    stream.read(text.data() + before, kChunk);
-    text.resize(before + static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > most_bytes) {
-      throw InputError(
-          fmt::format("{}: it is longer than {} bytes; expected {}; check that it is the right file", file, most_bytes, what));
-    }
-  }
-  return text;
-}
-
 NumberTable read_numbers(const std::string& file, std::size_t columns, std::size_t least_columns) {
-  const std::string text = read_text(file, "a CSV file of numbers", kMostBytes);
+  const std::string text = read_text(file, "a CSV file of numbers");
   NumberTable table;
   int line = 0;
   bool first = true;

@@ -18,7 +18,4 @@ struct NumberTable {
 /// found; what was expected; what to do`.
 NumberTable read_numbers(const std::string& file, std::size_t columns, std::size_t least_columns = 1);
 
-/// All of a file, of at most `most_bytes`. `what` says in messages what it should be. Throws InputError.
-std::string read_text(const std::string& file, const std::string& what, std::size_t most_bytes);
-
 }  // namespace linden

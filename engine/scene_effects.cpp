@@ -107,8 +107,8 @@ class Reader {
   void refuse_follower(const SceneValue& at, const NamedJoint& joint) const {
     const auto found = leader_of_.find(joint.slot);
     if (found == leader_of_.end()) return;
-    at.fail(fmt::format("joint \"{}\" follows another", joint_name(joint.slot)), "a joint that follows none",
-            fmt::format("name its leader \"{}\"", joint_name(found->second)));
+    at.fail(fmt::format("joint {} follows another", linden::quoted(joint_name(joint.slot))), "a joint that follows none",
+            fmt::format("name its leader {}", linden::quoted(joint_name(found->second))));
   }
 
   LinkPlace body(const SceneValue& at, const std::string& link) const {
@@ -296,8 +296,8 @@ class Reader {
     }
     if (result_.effects.servos.empty()) warn("no joint has any");
     if (!dead.empty()) {
-      warn(fmt::format("{} of {} servos have no strength (\"{}\"): their effort limit is 0; max_force gives another", dead.size(),
-                       result_.effects.servos.size(), dead.front()));
+      warn(fmt::format("{} of {} servos have no strength ({}): their effort limit is 0; max_force gives another", dead.size(),
+                       result_.effects.servos.size(), linden::quoted(dead.front())));
     }
   }
 

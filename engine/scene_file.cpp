@@ -3,16 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 #include <unordered_set>
 #include <utility>
 
 #include "engine/load_model.hpp"
-#include "engine/number_table.hpp"
 #include "engine/scene_effects.hpp"
 #include "engine/scene_yaml.hpp"
 #include "layout/merged_models.hpp"
+#include "layout/text_file.hpp"
 #include "layout/words.hpp"
 #include "models/generators.hpp"
 
@@ -26,6 +27,7 @@ const std::vector<std::string> kScene{"model", "models",    "base", "step",     
 const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity"};
 const std::vector<std::string> kBases{"fixed", "floating"};
+constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 
 /// A model of the list `models`.
 struct Entrant {
@@ -43,7 +45,10 @@ class SceneReader {
     root_.entries_of(kScene, effect_keys(), "effects");
     read_model();
     read_options();
-    scene_.initial = read_start(root_.find("initial"), scene_.model, bases_, given_);
+    const auto initial = root_.find("initial");
+    scene_.initial = read_start(initial, scene_.model, bases_, given_);
+    require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
+    require_finite(initial.value_or(root_), "velocity", scene_.initial.velocities, scene_.model.names.velocity);
     scene_.options.gravity = {};
     if (const auto effects = root_.find("effects")) {
       SceneEffects read = read_effects(*effects, scene_.model, scene_.initial.positions, folder_);
@@ -68,8 +73,18 @@ class SceneReader {
     read_models(*several);
   }
 
+  /// What is finite number by number may come to more: by a large spread, a turned frame, a leader's position times a multiplier.
+  static void require_finite(const SceneValue& at, const char* what, const std::vector<double>& values,
+                             const std::vector<std::string>& names) {
+    for (std::size_t row = 0; row < values.size(); ++row) {
+      if (std::isfinite(values[row])) continue;
+      at.fail(fmt::format("the {} {} is {} at the start", what, linden::quoted(names[row]), values[row]), "finite numbers",
+              "choose smaller ones, or a smaller spread");
+    }
+  }
+
   Model load(const SceneValue& at, const std::optional<SceneValue>& base) const {
-    const std::string& name = at.text("a URDF file, or a generated model such as chain:3");
+    const std::string& name = at.text(kAModel);
     const std::optional<Base> root =
         base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
     if (is_generated(name)) {
@@ -79,7 +94,7 @@ class SceneReader {
         return generate(name);
       });
     }
-    if (is_scene(name)) at.refuse("a URDF file, or a generated model such as chain:3", "a scene holds models, not scenes");
+    if (is_scene(name)) at.refuse(kAModel, "a scene holds models, not scenes");
     const std::string file = (std::filesystem::path(folder_) / name).string();
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored)) {
@@ -91,7 +106,9 @@ class SceneReader {
 
   void read_models(const SceneValue& at) {
     std::vector<Entrant> entrants;
-    for (const SceneValue& item : at.list("models, {model: FILE.urdf, name: ..., position: [x, y, z]}")) {
+    const std::vector<SceneValue> items = at.list("models, {model: FILE.urdf, name: ..., position: [x, y, z]}");
+    at.located([&] { require_memory("all of them", memory_of_generated(items)); });
+    for (const SceneValue& item : items) {
       item.entries_of(kModel);
       const auto model = item.find("model");
       if (!model)
@@ -110,6 +127,18 @@ class SceneReader {
     }
     scene_.model = at.located([&] { return merged(parts, std::filesystem::path(file_).stem().string()); });
     for (const Entrant& entrant : entrants) remember_bases(entrant, parts[static_cast<std::size_t>(&entrant - entrants.data())]);
+  }
+
+  /// Of all generated models together.
+  static double memory_of_generated(const std::vector<SceneValue>& items) {
+    double bytes = 0;
+    for (const SceneValue& item : items) {
+      const auto model = item.find("model");
+      if (!model || !model->is(Kind::text)) continue;
+      const std::string& name = model->text(kAModel);
+      if (is_generated(name)) bytes += memory_of(name);
+    }
+    return bytes;
   }
 
   /// Several models need a name each: the one they are given, or their own.

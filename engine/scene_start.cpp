@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "layout/effects.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 namespace {
@@ -70,8 +71,8 @@ class Start {
     }
     for (const Mimic& mimic : model_.mimics) {
       if (mimic.follower_slot != slot) continue;
-      at.fail(fmt::format("joint \"{}\" follows another", entry.key), "a joint that follows none",
-              fmt::format("name its leader \"{}\"", model_.names.joint[static_cast<std::size_t>(mimic.leader_slot)]));
+      at.fail(fmt::format("joint {} follows another", quoted(entry.key)), "a joint that follows none",
+              fmt::format("name its leader {}", quoted(model_.names.joint[static_cast<std::size_t>(mimic.leader_slot)])));
     }
     switch (tree.kind(slot)) {
       case JointKind::screw: put(velocity, velocity ? tree.first_v(slot) : tree.first_q(slot), {at.number()}); break;
@@ -84,7 +85,7 @@ class Start {
         }
         break;
       case JointKind::free:
-        at.fail(fmt::format("joint \"{}\" is a free joint", entry.key), "a joint that turns or slides",
+        at.fail(fmt::format("joint {} is a free joint", quoted(entry.key)), "a joint that turns or slides",
                 tree.parent(slot) == 0 ? "write initial.base, or position and velocity beside its model" : "leave it out");
     }
   }

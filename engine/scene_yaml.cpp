@@ -235,6 +235,12 @@ void SceneValue::refuse(std::string_view expected, std::string_view advice) cons
        advice);
 }
 
+std::string SceneValue::path_to(std::string_view key) const {
+  // as in messages: on one line, and short, since every value below holds it
+  const std::string text = quoted(key);
+  return fmt::format("{}{}{}", path_, path_.empty() ? "" : ".", std::string_view(text).substr(1, text.size() - 2));
+}
+
 std::string SceneValue::place() const { return fmt::format("{}:{}: {}", *file_, line_, path_); }
 
 void SceneValue::rethrow(const char* message) const {
@@ -318,8 +324,7 @@ std::vector<SceneValue::Entry> SceneValue::entries(std::string_view expected) co
   if (!is(Kind::map)) refuse(expected, "write key: value lines, indented, or { key: value }");
   std::vector<Entry> values;
   for (std::size_t k = 0; k < node_->items.size(); ++k) {
-    const std::string path = one_line(path_.empty() ? node_->keys[k] : path_ + "." + node_->keys[k]);
-    values.push_back({node_->keys[k], {*node_->items[k], path, node_->key_lines[k], *file_}});
+    values.push_back({node_->keys[k], {*node_->items[k], path_to(node_->keys[k]), node_->key_lines[k], *file_}});
   }
   return values;
 }
@@ -345,8 +350,7 @@ std::optional<SceneValue> SceneValue::find(std::string_view key) const {
   const auto found = std::ranges::find(node_->keys, key);
   if (found == node_->keys.end()) return std::nullopt;
   const auto k = static_cast<std::size_t>(found - node_->keys.begin());
-  return SceneValue(*node_->items[k], path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key), node_->key_lines[k],
-                    *file_);
+  return SceneValue(*node_->items[k], path_to(key), node_->key_lines[k], *file_);
 }
 
 }  // namespace linden

@@ -86,6 +86,7 @@ class SceneValue {
   std::optional<SceneValue> find(std::string_view key) const;
 
  private:
+  std::string path_to(std::string_view key) const;
   void rethrow(const char* message) const;
 
   const YamlNode* node_;

@@ -10,6 +10,7 @@
 #include "engine/instance_stepper.hpp"
 #include "engine/scene.hpp"
 #include "layout/input_error.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 
@@ -48,7 +49,8 @@ Simulation::Simulation(const Scene& scene) : Simulation(scene.model, scene.optio
 
 void Simulation::check_row_count(const char* what, std::size_t found, Index expected) const {
   if (found != static_cast<std::size_t>(expected)) {
-    throw InputError(fmt::format("{}: {} numbers given for model \"{}\", expected {}", what, found, model_->names.model, expected));
+    throw InputError(fmt::format("{}: {} numbers given for model {}, expected {}", what, found, quoted(model_->names.model),
+                                 expected));
   }
 }
 
@@ -82,7 +84,7 @@ void Simulation::set_positions(std::span<const double> q) {
 void Simulation::set_velocities(std::span<const double> v) {
   check_row_count("velocities", v.size(), model_->tree.shape.velocities);
   for (std::size_t i = 0; i < v.size(); ++i) {
-    if (!std::isfinite(v[i])) throw InputError(fmt::format("velocity \"{}\" is {}", model_->names.velocity[i], v[i]));
+    if (!std::isfinite(v[i])) throw InputError(fmt::format("velocity {} is {}", quoted(model_->names.velocity[i]), v[i]));
   }
   std::ranges::copy(v, rate_.flat().begin());
   spread_mimics<double>(model_->mimics, rate_);
@@ -93,7 +95,8 @@ void Simulation::set_velocities(std::span<const double> v) {
 void Simulation::set_forces(std::span<const double> force) {
   if (!force.empty()) check_row_count("forces", force.size(), model_->tree.shape.velocities);
   for (std::size_t i = 0; i < force.size(); ++i) {
-    if (!std::isfinite(force[i])) throw InputError(fmt::format("the force on \"{}\" is {}", model_->names.velocity[i], force[i]));
+    if (std::isfinite(force[i])) continue;
+    throw InputError(fmt::format("the force on {} is {}", quoted(model_->names.velocity[i]), force[i]));
   }
   stepper_.apply(force);
   stepper_.refresh(state_);
@@ -124,7 +127,7 @@ void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, cons
   if (wrench == plan_->effects.wrenches.end()) {
     const bool body = slot > 0 && slot < model_->tree.shape.slots;
     throw InputError(fmt::format("no wrench acts on {}; expected one among the effects; name it there, zero if need be",
-                                 body ? fmt::format("body \"{}\"", model_->names.body[static_cast<std::size_t>(slot)])
+                                 body ? fmt::format("body {}", quoted(model_->names.body[static_cast<std::size_t>(slot)]))
                                       : fmt::format("slot {}", slot)));
   }
   for (const double number : {force[0], force[1], force[2], moment[0], moment[1], moment[2]}) {

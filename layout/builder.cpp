@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <unordered_set>
 
 #include "layout/origin_inertia.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 namespace {
@@ -91,10 +93,10 @@ class Build {
   void index_names() {
     for (std::size_t i = 0; i < links_.size(); ++i) {
       if (!link_at_.emplace(links_[i].name, i).second) {
-        fail(fmt::format("two links are called \"{}\"; names must be unique", links_[i].name));
+        fail(fmt::format("two links are called {}; names must be unique", quoted(links_[i].name)));
       }
       if (!joint_at_.emplace(links_[i].joint, i).second) {
-        fail(fmt::format("two joints are called \"{}\"; names must be unique", links_[i].joint));
+        fail(fmt::format("two joints are called {}; names must be unique", quoted(links_[i].joint)));
       }
     }
   }
@@ -109,7 +111,7 @@ class Build {
       }
       const auto parent = link_at_.find(links_[i].parent);
       if (parent == link_at_.end()) {
-        fail(fmt::format("joint \"{}\": its parent link \"{}\" does not exist", links_[i].joint, links_[i].parent));
+        fail(fmt::format("joint {}: its parent link {} does not exist", quoted(links_[i].joint), quoted(links_[i].parent)));
       }
       children[parent->second].push_back(i);
     }
@@ -121,8 +123,8 @@ class Build {
     std::vector<bool> reached(links_.size(), false);
     for (const std::size_t link : order_) reached[link] = true;
     const auto lost = static_cast<std::size_t>(std::find(reached.begin(), reached.end(), false) - reached.begin());
-    fail(fmt::format("link \"{}\" hangs in a loop of joints that never reaches the world; cut the loop at one joint",
-                     links_[lost].name));
+    fail(fmt::format("link {} hangs in a loop of joints that never reaches the world; cut the loop at one joint",
+                     quoted(links_[lost].name)));
   }
 
   void check_numbers(const LinkSpec& link) const {
@@ -133,13 +135,15 @@ class Build {
                         std::isfinite(link.offset);
     const bool limits_are_numbers = !std::isnan(link.limits.lower) && !std::isnan(link.limits.upper) &&
                                     !std::isnan(link.limits.velocity) && !std::isnan(link.limits.effort);
-    if (!finite || !limits_are_numbers) fail(fmt::format("link \"{}\" or its joint \"{}\" holds a number that is not finite", link.name, link.joint));
+    if (!finite || !limits_are_numbers) {
+      fail(fmt::format("link {} or its joint {} holds a number that is not finite", quoted(link.name), quoted(link.joint)));
+    }
     if (link.limits.lower > link.limits.upper) {
-      fail(fmt::format("joint \"{}\": its lower limit {} is above its upper limit {}", link.joint, link.limits.lower,
+      fail(fmt::format("joint {}: its lower limit {} is above its upper limit {}", quoted(link.joint), link.limits.lower,
                        link.limits.upper));
     }
     if (link.damping < 0 || link.friction < 0) {
-      fail(fmt::format("joint \"{}\": damping {} and friction {} must not be negative", link.joint, link.damping,
+      fail(fmt::format("joint {}: damping {} and friction {} must not be negative", quoted(link.joint), link.damping,
                        link.friction));
     }
   }
@@ -147,11 +151,11 @@ class Build {
   void check_inertia(const LinkSpec& link) {
     const LinkInertia& inertia = link.inertia;
     if (inertia.mass < 0) {
-      fail(fmt::format("link \"{}\": mass {} kg is negative; expected zero or more", link.name, inertia.mass));
+      fail(fmt::format("link {}: mass {} kg is negative; expected zero or more", quoted(link.name), inertia.mass));
     }
     const Matrix3d& about = inertia.about_center;
     if (!about.isApprox(about.transpose(), 1e-9) && !about.isZero(0)) {
-      fail(fmt::format("link \"{}\": its inertia matrix is not symmetric", link.name));
+      fail(fmt::format("link {}: its inertia matrix is not symmetric", quoted(link.name)));
     }
     const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(about, Eigen::EigenvaluesOnly).eigenvalues();
     const double largest = moments.cwiseAbs().maxCoeff();
@@ -160,17 +164,17 @@ class Build {
     const double excess = (moments[2] - moments[0] - moments[1]) / largest;
     const std::string principal = fmt::format("principal moments {:.6g} {:.6g} {:.6g} kg m^2", moments[0], moments[1], moments[2]);
     if (negative > kNegativeSlack) {
-      fail(fmt::format("link \"{}\": its inertia is not positive definite ({}); check the signs of its products of inertia",
-                       link.name, principal));
+      fail(fmt::format("link {}: its inertia is not positive definite ({}); check the signs of its products of inertia",
+                       quoted(link.name), principal));
     }
     if (inertia.mass == 0) {
-      model_.warnings.push_back(fmt::format("link \"{}\" has inertia but no mass ({})", link.name, principal));
+      model_.warnings.push_back(fmt::format("link {} has inertia but no mass ({})", quoted(link.name), principal));
     }
     if (excess > kTriangleSlack) {
       model_.warnings.push_back(fmt::format(
-          "link \"{}\": no solid body has this inertia ({}): the largest moment exceeds the sum of the others by {:.2g} of itself; "
+          "link {}: no solid body has this inertia ({}): the largest moment exceeds the sum of the others by {:.2g} of itself; "
           "used as it is",
-          link.name, principal, excess));
+          quoted(link.name), principal, excess));
     }
   }
 
@@ -179,8 +183,8 @@ class Build {
       const bool mirrors = shape.shape.kind == ShapeKind::mesh;
       for (const double size : shape.shape.size) {
         if (!std::isfinite(size) || (size < 0 && !mirrors) || !shape.pose.matrix().allFinite()) {
-          fail(fmt::format("link \"{}\": a collision shape has a negative size, or a size or pose that is not finite",
-                           link.name));
+          fail(fmt::format("link {}: a collision shape has a negative size, or a size or pose that is not finite",
+                           quoted(link.name)));
         }
       }
     }
@@ -189,7 +193,7 @@ class Build {
   Vector3d unit_axis(const LinkSpec& link) const {
     const double length = link.axis.norm();
     if (!(length > 1e-9)) {
-      fail(fmt::format("joint \"{}\": its axis ({} {} {}) has no direction", link.joint, link.axis.x(), link.axis.y(),
+      fail(fmt::format("joint {}: its axis ({} {} {}) has no direction", quoted(link.joint), link.axis.x(), link.axis.y(),
                        link.axis.z()));
     }
     return std::abs(length - 1) < 1e-15 ? link.axis : Vector3d(link.axis / length);
@@ -200,6 +204,12 @@ class Build {
     const LinkSpec& link = links_[at];
     const Carrier parent = link.parent.empty() ? Carrier{} : carrier_[link_at_.at(link.parent)];
     const Isometry3d joint = parent.pose * link.placement;
+    if (!joint.matrix().allFinite()) {
+      const std::string from = parent.body < 0 ? "the world" : quoted(bodies_[static_cast<std::size_t>(parent.body)].link);
+      fail(fmt::format("joint {}: it lies too far from {} for numbers; expected metres; check the origins of the fixed joints "
+                       "between them",
+                       quoted(link.joint), from));
+    }
     if (link.type == JointType::fixed) {
       carrier_[at] = {parent.body, joint};
       if (parent.body >= 0) bodies_[static_cast<std::size_t>(parent.body)].inertia += OriginInertia(link.inertia, joint);
@@ -320,7 +330,12 @@ class Build {
       const Index slot = slot_of(carrier_[link].body);
       if (slot == 0) continue;
       for (const LinkShape& shape : links_[link].shapes) {
-        model_.shapes.push_back({slot, links_[link].name, Pose(carrier_[link].pose * shape.pose), shape.shape});
+        const Pose pose(carrier_[link].pose * shape.pose);
+        if (!pose.matrix().allFinite()) {
+          fail(fmt::format("link {}: a collision shape lies too far away for numbers; expected metres; check its origin",
+                           quoted(links_[link].name)));
+        }
+        model_.shapes.push_back({slot, links_[link].name, pose, shape.shape});
       }
     }
     std::stable_sort(model_.shapes.begin(), model_.shapes.end(),
@@ -348,7 +363,7 @@ class Build {
   void check_coordinate_names() const {
     std::unordered_set<std::string> seen;
     for (const std::string& name : model_.names.position) {
-      if (!seen.insert(name).second) fail(fmt::format("two coordinates are called \"{}\"; rename one of their joints", name));
+      if (!seen.insert(name).second) fail(fmt::format("two coordinates are called {}; rename one of their joints", quoted(name)));
     }
   }
 
@@ -373,6 +388,11 @@ class Build {
       OriginInertia& whole = composite[static_cast<std::size_t>(i)];
       whole += body.inertia;
       const double scale = whole.about_origin.trace();
+      if (!std::isfinite(whole.mass) || !whole.moment.allFinite() || !whole.about_origin.allFinite() || !std::isfinite(scale)) {
+        fail(fmt::format("joint {}: link {} and all below it are too heavy or too large for numbers; expected kilograms and "
+                         "metres; check their masses, inertias and origins",
+                         quoted(body.joint), quoted(body.link)));
+      }
       double felt = 0, possible = scale;
       if (body.kind == JointKind::screw) {
         felt = body.turn * body.turn * whole.about_origin(2, 2) + body.shift * body.shift * whole.mass;
@@ -387,9 +407,9 @@ class Build {
         if (body.kind == JointKind::free && whole.mass == 0) felt = 0;
       }
       if (!(felt > kMovesNothing * possible)) {
-        fail(fmt::format("joint \"{}\" moves nothing that resists: link \"{}\" and all below it have a mass of {:.3g} kg and an "
+        fail(fmt::format("joint {} moves nothing that resists: link {} and all below it have a mass of {:.3g} kg and an "
                          "inertia of {:.3g} kg m^2 in the direction the joint frees; give the link an inertia, or fix the joint",
-                         body.joint, body.link, whole.mass, std::max(felt, 0.0)));
+                         quoted(body.joint), quoted(body.link), whole.mass, std::max(felt, 0.0)));
       }
       if (body.parent >= 0) {
         composite[static_cast<std::size_t>(slot_of(body.parent))] += whole.seen_from(body.placement);
@@ -397,39 +417,64 @@ class Build {
     }
   }
 
+  /// Who leads a joint in the end: q = multiplier q_leader + offset. Who follows nobody leads itself.
+  struct Leader {
+    std::size_t link;
+    double multiplier = 1, offset = 0;
+  };
+
   void resolve_mimics() {
-    for (const LinkSpec& link : links_) {
+    std::vector<std::optional<Leader>> leaders(links_.size());
+    for (std::size_t i = 0; i < links_.size(); ++i) {
+      const LinkSpec& link = links_[i];
       if (link.mimic.empty()) continue;
-      double multiplier = link.multiplier, offset = link.offset;
-      const LinkSpec* leader = &leader_of(link);
-      for (std::size_t hops = 0; !leader->mimic.empty(); ++hops) {
-        if (hops > links_.size()) fail(fmt::format("joint \"{}\": mimic joints follow each other in a circle", link.joint));
-        offset += multiplier * leader->offset;
-        multiplier *= leader->multiplier;
-        leader = &leader_of(*leader);
+      const Leader leader = leader_in_the_end(i, leaders);
+      if (!std::isfinite(leader.multiplier) || !std::isfinite(leader.offset)) {
+        fail(fmt::format("joint {} follows {} by a multiplier of {} and an offset of {}, with all mimics between them; "
+                         "expected finite numbers; correct them",
+                         quoted(link.joint), quoted(links_[leader.link].joint), leader.multiplier, leader.offset));
       }
-      const Index follower_slot = screw_slot(link), leader_slot = screw_slot(*leader);
-      if (follower_slot == leader_slot) fail(fmt::format("joint \"{}\" mimics itself", link.joint));
+      const Index follower_slot = screw_slot(link), leader_slot = screw_slot(links_[leader.link]);
       const Tree& tree = model_.tree;
       model_.mimics.push_back({follower_slot, leader_slot, tree.first_v(follower_slot), tree.first_v(leader_slot),
-                               tree.first_q(follower_slot), tree.first_q(leader_slot), multiplier, offset});
+                               tree.first_q(follower_slot), tree.first_q(leader_slot), leader.multiplier, leader.offset});
     }
   }
 
-  const LinkSpec& leader_of(const LinkSpec& link) const {
+  /// Each link is walked over once, however long the row of followers.
+  Leader leader_in_the_end(std::size_t link, std::vector<std::optional<Leader>>& leaders) const {
+    std::vector<std::size_t> followers;
+    std::size_t at = link;
+    while (!leaders[at] && !links_[at].mimic.empty()) {
+      if (followers.size() > links_.size()) {
+        fail(fmt::format("joint {}: mimic joints follow each other in a circle", quoted(links_[link].joint)));
+      }
+      followers.push_back(at);
+      at = leader_of(links_[at]);
+    }
+    Leader leader = leaders[at].value_or(Leader{at});
+    for (auto next = followers.rbegin(); next != followers.rend(); ++next) {
+      const LinkSpec& follower = links_[*next];
+      leader = {leader.link, follower.multiplier * leader.multiplier, follower.multiplier * leader.offset + follower.offset};
+      leaders[*next] = leader;
+    }
+    return leader;
+  }
+
+  std::size_t leader_of(const LinkSpec& link) const {
     const auto leader = joint_at_.find(link.mimic);
     if (leader == joint_at_.end()) {
-      fail(fmt::format("joint \"{}\" mimics \"{}\", which does not exist", link.joint, link.mimic));
+      fail(fmt::format("joint {} mimics {}, which does not exist", quoted(link.joint), quoted(link.mimic)));
     }
-    return links_[leader->second];
+    return leader->second;
   }
 
   Index screw_slot(const LinkSpec& link) const {
     const bool screw = link.type == JointType::revolute || link.type == JointType::prismatic || link.type == JointType::helical;
     if (!screw) {
-      fail(fmt::format("joint \"{}\" takes part in a mimic but is fixed, planar, ball or free; only turning and sliding joints "
+      fail(fmt::format("joint {} takes part in a mimic but is fixed, planar, ball or free; only turning and sliding joints "
                        "can lead or follow",
-                       link.joint));
+                       quoted(link.joint)));
     }
     return model_.names.slot_of_joint.at(link.joint);
   }

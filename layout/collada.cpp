@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "layout/input_error.hpp"
+#include "layout/text_file.hpp"
 #include "layout/words.hpp"
+#include "layout/xml_text.hpp"
 
 namespace linden {
 namespace {
@@ -21,13 +23,17 @@ using Eigen::Affine3d;
 using Eigen::Vector3d;
 using tinyxml2::XMLElement;
 
-/// More than any robot's part has, few enough to be walked in a second.
-constexpr std::size_t kMostElements = 1'000'000, kMostPoints = 50'000'000;
+/// More than any robot's part has, few enough to be walked in a fraction of a second.
+constexpr std::size_t kMostElements = 200'000, kMostPoints = 20'000'000;
 
 class Collada {
  public:
   explicit Collada(const std::string& file) : file_(file) {
-    if (document_.LoadFile(file.c_str()) != tinyxml2::XML_SUCCESS) {
+    const std::string text = read_text(file, "a COLLADA file");
+    if (const int line = line_of_crowded_element(text); line > 0) {
+      fail(fmt::format("the element in line {} has more than {} attributes", line, kMostAttributes), "a COLLADA file");
+    }
+    if (document_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
       fail(fmt::format("line {} is no XML", document_.ErrorLineNum()), "a COLLADA file");
     }
     root_ = document_.FirstChildElement("COLLADA");

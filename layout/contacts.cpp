@@ -10,6 +10,7 @@
 #include "layout/mesh_box.hpp"
 #include "layout/mesh_path.hpp"
 #include "layout/model.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 namespace {
@@ -75,16 +76,17 @@ class Touch {
     const auto [read, first_time] = read_.try_emplace(name);
     if (first_time) read->second = read_mesh(name);
     if (!read->second.trouble.empty()) {
-      notes_.push_back(fmt::format("link \"{}\": {}; it touches nothing", body.link, read->second.trouble));
+      notes_.push_back(fmt::format("link {}: {}; it touches nothing", quoted(body.link), read->second.trouble));
       return;
     }
     const Vector3d scale(body.shape.size[0], body.shape.size[1], body.shape.size[2]);
     const Vector3d one = read->second.box.min().cwiseProduct(scale), other = read->second.box.max().cwiseProduct(scale);
-    if (!(other - one).allFinite()) {
-      notes_.push_back(fmt::format("link \"{}\": mesh \"{}\" is too large for numbers; it touches nothing", body.link, name));
+    const MeshBox box(one.cwiseMin(other), one.cwiseMax(other));
+    if (!box.sizes().allFinite() || !box.center().allFinite()) {
+      notes_.push_back(fmt::format("link {}: mesh \"{}\" is too large for numbers; it touches nothing", quoted(body.link), name));
       return;
     }
-    add_corners(body, {one.cwiseMin(other), one.cwiseMax(other)});
+    add_corners(body, box);
     meshes_ += 1;
   }
 

@@ -17,9 +17,11 @@
 namespace linden {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 std::string advice_for(const std::string& name, const std::vector<std::string>& known, const char* otherwise) {
   const std::string guess = nearest(name, known);
-  return guess.empty() ? otherwise : fmt::format("did you mean \"{}\"?", guess);
+  return guess.empty() ? otherwise : fmt::format("did you mean {}?", quoted(guess));
 }
 
 /// "row 7, joint elbow", for messages: the velocity's name is the joint's, with a component for ball and free joints.
@@ -105,7 +107,7 @@ class Checker {
     each("ball_springs", effects_.ball_springs, [&](const BallSpring& entry) {
       require_slot(entry.slot);
       if (model_.tree.kind(entry.slot) != JointKind::ball) {
-        fail(fmt::format("joint \"{}\" is no ball joint", model_.names.joint[static_cast<std::size_t>(entry.slot)]),
+        fail(fmt::format("joint {} is no ball joint", quoted(model_.names.joint[static_cast<std::size_t>(entry.slot)])),
              "a ball joint", "give it a JointSpring");
       }
       not_negative("stiffness", entry.stiffness);
@@ -125,6 +127,10 @@ class Checker {
       require_screw(entry.row);
       if (!(entry.lower <= entry.upper)) {
         fail(fmt::format("lower is {}, upper is {}", entry.lower, entry.upper), "lower at or below upper", "exchange them");
+      }
+      if (entry.lower == kInfinity || entry.upper == -kInfinity) {
+        fail(fmt::format("{} may only be at {}", row_text(model_, entry.row), entry.lower), "limits that a joint can be between",
+             "change them");
       }
       if (!(entry.restitution >= 0 && entry.restitution <= 1)) {
         fail(fmt::format("restitution is {}", entry.restitution), "0 to 1", "0 stops, 1 bounces back at the same speed");
@@ -158,7 +164,7 @@ class Checker {
       not_negative("linear", entry.linear);
       not_negative("quadratic", entry.quadratic);
       if (!(model_.constants.inertia(entry.slot, 0) > 0)) {
-        fail(fmt::format("body \"{}\" has no mass", model_.names.body[static_cast<std::size_t>(entry.slot)]),
+        fail(fmt::format("body {} has no mass", quoted(model_.names.body[static_cast<std::size_t>(entry.slot)])),
              "one with a centre of mass for drag to act on", "leave it out");
       }
     });
@@ -196,9 +202,9 @@ class Checker {
       fail(fmt::format("row {} does not exist", row), fmt::format("0 to {}", facts_.count() - 1), "take it from row_of");
     }
     if (const Mimic* mimic = facts_.mimic(row)) {
-      fail(fmt::format("joint \"{}\" follows another", model_.names.joint[static_cast<std::size_t>(mimic->follower_slot)]),
+      fail(fmt::format("joint {} follows another", quoted(model_.names.joint[static_cast<std::size_t>(mimic->follower_slot)])),
            "a joint that follows none",
-           fmt::format("name its leader \"{}\"", model_.names.joint[static_cast<std::size_t>(mimic->leader_slot)]));
+           fmt::format("name its leader {}", quoted(model_.names.joint[static_cast<std::size_t>(mimic->leader_slot)])));
     }
   }
 
@@ -323,7 +329,7 @@ Index row_of(const Model& model, const std::string& joint) {
   // a part of a planar joint
   for (Index i = 1; slot == 0 && i < model.tree.shape.slots; ++i) slot = is_it(i) ? i : 0;
   if (slot == 0) {
-    throw InputError(fmt::format("no joint {} moves in model \"{}\"; expected one that does; {}", quoted(joint), names.model,
+    throw InputError(fmt::format("no joint {} moves in model {}; expected one that does; {}", quoted(joint), quoted(names.model),
                                  advice_for(joint, {names.joint.begin() + 1, names.joint.end()}, "linden inspect lists them")));
   }
   return model.tree.first_v(slot);
@@ -335,7 +341,7 @@ const LinkPlace& place_of(const Model& model, const std::string& link) {
   std::vector<std::string> known;
   for (const auto& [name, place] : model.names.link) known.push_back(name);
   std::ranges::sort(known);
-  throw InputError(fmt::format("model \"{}\" has no link {}; expected one that it has; {}", model.names.model, quoted(link),
+  throw InputError(fmt::format("model {} has no link {}; expected one that it has; {}", quoted(model.names.model), quoted(link),
                                advice_for(link, known, "linden inspect lists them")));
 }
 
@@ -383,9 +389,9 @@ std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLi
   for (const JointLimit& limit : result) {
     if (limit.lower > limit.upper) {
       throw InputError(
-          fmt::format("joint \"{}\": its limits and those of the joints that follow it leave no room, {} to {}; expected "
+          fmt::format("joint {}: its limits and those of the joints that follow it leave no room, {} to {}; expected "
                       "limits that overlap; widen them",
-                      model.names.velocity[static_cast<std::size_t>(limit.row)], limit.lower, limit.upper));
+                      quoted(model.names.velocity[static_cast<std::size_t>(limit.row)]), limit.lower, limit.upper));
     }
   }
   return result;
@@ -436,8 +442,8 @@ std::vector<JointFriction> friction_everywhere(const Model& model, double force)
 
 std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping, const std::vector<double>& positions) {
   if (!positions.empty() && positions.size() != static_cast<std::size_t>(model.tree.shape.positions)) {
-    throw InputError(fmt::format("{} positions given as targets; expected {}; give one a coordinate of model \"{}\"",
-                                 positions.size(), model.tree.shape.positions, model.names.model));
+    throw InputError(fmt::format("{} positions given as targets; expected {}; give one a coordinate of model {}",
+                                 positions.size(), model.tree.shape.positions, quoted(model.names.model)));
   }
   const RowFacts facts(model);
   std::vector<Servo> list;

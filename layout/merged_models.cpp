@@ -8,6 +8,7 @@
 
 #include "layout/input_error.hpp"
 #include "layout/mesh_path.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 namespace {
@@ -44,8 +45,8 @@ class Merger {
     for (std::size_t part = 0; part < parts_.size(); ++part) {
       const Tree& tree = parts_[part].model.tree;
       if (!parts_[part].pose.matrix().allFinite()) {
-        throw InputError(fmt::format("the pose of model \"{}\" is not finite; expected numbers; check its position and rotation",
-                                     parts_[part].name));
+        throw InputError(fmt::format("the pose of model {} is not finite; expected numbers; check its position and rotation",
+                                     quoted(parts_[part].name)));
       }
       new_slot_.emplace_back(static_cast<std::size_t>(tree.shape.slots), 0);
       for (const Run& run : tree.runs) {
@@ -169,7 +170,7 @@ class Merger {
 
   [[noreturn]] static void fail(const char* what, const std::string& name) {
     throw InputError(
-        fmt::format("two {} are called \"{}\"; names must be unique; give each model a name of its own", what, name));
+        fmt::format("two {} are called {}; names must be unique; give each model a name of its own", what, quoted(name)));
   }
 
   const std::vector<PlacedModel>& parts_;

@@ -154,6 +154,9 @@ MeshBox mesh_box(const std::string& file) {
     fail(file, "this kind of mesh is not read", "a name that ends in .stl, .obj or .dae");
   }
   if (box.isEmpty()) fail(file, "it holds no points", "a mesh");
+  if (!box.sizes().allFinite() || !box.center().allFinite()) {
+    fail(file, "its points lie too far apart for numbers", "the mesh of a robot's part");
+  }
   return box;
 }
 

@@ -5,15 +5,13 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <mutex>
-#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "layout/text_file.hpp"
 #include "layout/urdf_check.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 namespace {
@@ -184,24 +182,9 @@ LinkSpec root_spec(const Robot& robot, Base base) {
   return spec;
 }
 
-std::string read_file(const std::string& file) {
-  std::error_code ignored;
-  const std::filesystem::file_status status = std::filesystem::status(file, ignored);
-  if (!std::filesystem::exists(status)) {
-    throw InputError(fmt::format("{}: there is no such file; expected a URDF file; check the path", file));
-  }
-  if (std::filesystem::is_directory(status)) {
-    throw InputError(fmt::format("{}: this is a folder; expected a URDF file; name a file in it", file));
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw InputError(fmt::format("{}: it cannot be opened; expected a readable file; check its permissions", file));
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
 }  // namespace
 
-Model load_urdf(const std::string& file, Base base) { return parse_urdf(read_file(file), file, base); }
+Model load_urdf(const std::string& file, Base base) { return parse_urdf(read_text(file, "a URDF file"), file, base); }
 
 Model parse_urdf(const std::string& xml, const std::string& source_name, Base base) {
   CheckedUrdf checked = check_urdf(xml, source_name);
@@ -219,7 +202,7 @@ Model parse_urdf(const std::string& xml, const std::string& source_name, Base ba
     const urdf::LinkConstSharedPtr link = joint ? robot->getLink(joint->child_link_name) : nullptr;
     if (!link)
       throw InputError(
-          fmt::format("{}: urdfdom lost joint \"{}\"; expected plain text in names; rename it", source_name, name));
+          fmt::format("{}: urdfdom lost joint {}; expected plain text in names; rename it", source_name, quoted(name)));
     add(spec_of(*joint, *link));
   }
   return builder.build();

@@ -8,6 +8,7 @@
 
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
+#include "layout/xml_text.hpp"
 
 namespace linden {
 namespace {
@@ -87,6 +88,10 @@ UrdfStructure::UrdfStructure(const std::string& xml, UrdfReport& report) : repor
 const char* UrdfStructure::name() const { return robot_->Attribute("name"); }
 
 void UrdfStructure::parse(const std::string& xml) {
+  if (const int line = line_of_crowded_element(xml); line > 0) {
+    report_.fail(line, fmt::format("the element here has more than {} attributes", kMostAttributes), "an element of URDF",
+                 "delete what is not one");
+  }
   document_.Parse(xml.data(), xml.size());
   if (document_.ErrorID() == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) {
     report_.fail(1, "the file is empty", "a URDF robot, <robot name=\"...\"> ... </robot>",

@@ -2,7 +2,7 @@
 // What a URDF file says before any number is read: its XML, the names of links and joints, and who hangs from whom.
 //
 //   once a UrdfStructure stands                       else InputError
-//   the text is XML, <robot name="...">, no macros    not XML, another format, xacro:...
+//   the text is XML, <robot name="...">, no macros    not XML, another format, xacro:..., elements of 200 attributes
 //   every link and every joint has its own name       no name, or one name twice
 //   every joint has a known type, a parent, a child   other type, or a link that does not exist
 //   the links are one tree with one root              two joints above a link, a loop, two roots

@@ -14,10 +14,13 @@ namespace linden {
 
 std::string quoted(std::string_view text) {
   constexpr std::size_t kShown = 60;
-  std::string shown(text.substr(0, kShown));
+  std::size_t end = std::min(kShown, text.size());
+  // whole characters of UTF-8
+  while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  std::string shown(text.substr(0, end));
   std::replace_if(
       shown.begin(), shown.end(), [](unsigned char c) { return c < ' '; }, ' ');
-  return fmt::format("\"{}{}\"", shown, text.size() > kShown ? "..." : "");
+  return fmt::format("\"{}{}\"", shown, end < text.size() ? "..." : "");
 }
 
 std::string_view next_word(std::string_view& rest) {

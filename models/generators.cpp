@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "layout/words.hpp"
 #include "models/random.hpp"
 
 namespace linden {
@@ -212,8 +213,8 @@ Model generate(const std::string& name) {
   Index count = 0;
   const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
   if (error != std::errc{} || end != number.data() + number.size() || count < 1 || count > kMostBodies) {
-    throw InputError(fmt::format("model \"{}\": \"{}\" is no number of bodies; expected 1 to {}; write for example chain:100", name, number,
-                                 kMostBodies));
+    throw InputError(fmt::format("model {}: {} is no number of bodies; expected 1 to {}; write for example chain:100",
+                                 quoted(name), quoted(number), kMostBodies));
   }
   if (kind == "chain") return chain(count);
   if (kind == "paper-chain") return paper_chain(count);
@@ -221,9 +222,9 @@ Model generate(const std::string& name) {
   if (kind == "tree") return balanced_tree(count);
   if (kind == "random") return random_tree({.bodies = count});
   if (kind == "humanoids") return humanoids(count);
-  throw InputError(fmt::format("model \"{}\": \"{}\" cannot be generated; expected chain, ball-chain, paper-chain, tree, random or "
+  throw InputError(fmt::format("model {}: {} cannot be generated; expected chain, ball-chain, paper-chain, tree, random or "
                                "humanoids; choose one, or give a URDF file",
-                               name, kind));
+                               quoted(name), quoted(kind)));
 }
 
 }  // namespace linden

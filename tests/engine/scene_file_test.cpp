@@ -483,6 +483,16 @@ TEST_CASE("unknown joints and links are refused with the nearest one", "[scene]"
   check_message(kArm + "effects: {torque: {tool_flange_fixed: 1}}\n", 2, {"no joint \"tool_flange_fixed\" moves"});
 }
 
+TEST_CASE("names of any length are cut in messages", "[scene]") {
+  const std::string name(900, 'x');  // YAML allows keys of 1,024
+  for (const std::string& text :
+       {name + ": 1\n", "effects: {damping: {" + name + ": 1}}\n", "effects: {wrench: {\"a\\n" + name + "\": [1]}}\n",
+        "initial: {positions: {" + name + ": 1}}\n", "solver: " + name + "\n"}) {
+    check_message("model: chain:3\n" + text, 2, {"xxx..."});
+    CHECK(message("model: chain:3\n" + text).size() < 500);
+  }
+}
+
 TEST_CASE("joints that cannot have an effect are refused by name", "[scene]") {
   for (const char* effect : {"armature: {base: 1}", "damping: {base: 1}", "friction: {base: 1}", "spring: {base: {stiffness: 1}}",
                              "limits: {base: urdf}", "servo: {stiffness: 1, joints: [base]}", "torque: {base: 1}"}) {
@@ -568,6 +578,9 @@ TEST_CASE("values that make no sense are refused where they stand", "[scene]") {
   refused("effects: {ground: {terrain: {file: a.csv, spacing: [1, 0]}}}\n", {"two numbers above zero"});
   check_message("model: ball-chain:1\ninitial: {positions: {joint1: [0, 0, 0, 0]}}\n", 2, {"length 0", "unit quaternion"});
   check_message("step: 2\nduration: 1\nmodel: chain:3\n", 1, {"less than a step"});
+  refused("initial: {spread: 1.7e308}\n", {"the position \"joint1\" is ", " at the start", "a smaller spread"});
+  check_message(kHumanoid + "initial: {base: {velocity: [1.5e308, 1.5e308, 0], rotation: [0, 0, 0.8]}}\n", 3,
+                {"the velocity \"base.vx\" is inf at the start"});
 }
 
 TEST_CASE("models of a scene that cannot be are refused where they stand", "[scene]") {
@@ -577,6 +590,10 @@ TEST_CASE("models of a scene that cannot be are refused where they stand", "[sce
   check_message("model: chain:x\n", 1, {"no number of bodies"});
   check_message("model: chian:3\n", 1, {"cannot be generated"});
   check_message("model: chain:9999999999\n", 1, {"memory"});
+  check_message("model: chain:nan\n", 1, {"\"nan\" is no number of bodies"});
+  std::string many = "models:\n";
+  for (int k = 0; k < 100'000; ++k) many += fmt::format("- {{model: chain:1000000, name: a{}}}\n", k);
+  CHECK_THAT(message(many), StartsWith("s.yaml:1: models: all of them need about 236 TiB of memory; expected no more than "));
   check_message("model: other.yaml\n", 1, {"models, not scenes"});
   check_message("model: [chain:3]\n", 1, {"model is a list of 1"});
   check_message(kArm + "base: loose\n", 2, {"one of fixed, floating"});

@@ -415,20 +415,24 @@ TEST_CASE("a mesh that is missing or broken is noted and touches nothing, and th
   const Folder folder;
   folder.write("broken.stl", binary_stl(kTriangles).substr(0, 100));
   folder.write("huge.obj", "v 1e308 0 0\nv -1e308 1 1\n");
+  folder.write("large.obj", "v 1e200 0 0\nv 2e200 1 1\n");
   folder.write("robot.urdf", turning(collision("<mesh filename=\"package://nowhere/x.stl\"/>") +
                                      collision("<mesh filename=\"broken.stl\"/>") + collision("<mesh filename=\"huge.obj\"/>") +
+                                     collision("<mesh filename=\"large.obj\" scale=\"1e200 1 1\"/>") +
                                      collision("<sphere radius=\"1\"/>")));
   const Model model = load_urdf(folder.file("robot.urdf"));
   REQUIRE(model.warnings.empty());
-  REQUIRE(model.shapes.size() == 4);
+  REQUIRE(model.shapes.size() == 5);
   std::vector<std::string> notes;
   const Contacts contacts = contacts_of(model, notes);
   REQUIRE(contacts.spheres.size() == 1);
-  REQUIRE(notes.size() == 3);
+  REQUIRE(notes.size() == 4);
   CHECK(notes[0] == "link \"b\": mesh \"package://nowhere/x.stl\" not found; it touches nothing");
   CHECK(notes[1] == "link \"b\": mesh " + folder.file("broken.stl") +
                         ": it holds 100 bytes; expected 184 for the 2 triangles it announces; it touches nothing");
-  CHECK(notes[2] == "link \"b\": mesh \"huge.obj\" is too large for numbers; it touches nothing");
+  CHECK(notes[2] == "link \"b\": mesh " + folder.file("huge.obj") +
+                        ": its points lie too far apart for numbers; expected the mesh of a robot's part; it touches nothing");
+  CHECK(notes[3] == "link \"b\": mesh \"large.obj\" is too large for numbers; it touches nothing");
 }
 
 TEST_CASE("a mesh is found by its path, beside the robot's file, in a folder above, and where ROS looks") {
@@ -495,6 +499,11 @@ TEST_CASE("a malformed mesh is refused for what it is") {
   CHECK_THAT(scene_refusal("<instance_geometry url=\"#lost\"/>"), Contains("shows \"#lost\""));
   CHECK_THAT(scene_refusal("<skew>1</skew>" + kShowPart), Contains("<skew>, which is not read"));
   CHECK_THAT(scene_refusal("<scale>1 2</scale>"), Contains("a bad <scale>; expected 3"));
+  std::string crowded = "<COLLADA>\n<node ";
+  for (int i = 0; i < 300'000; ++i) crowded += fmt::format("a{}='' ", i);
+  CHECK_THAT(refusal("x.dae", crowded + "/></COLLADA>"), Contains("the element in line 2 has more than 200 attributes"));
+  CHECK_THAT(refusal("x.obj", "v -1e308 0 0\nv 1e308 0 0\n"), Contains("its points lie too far apart for numbers"));
+  CHECK_THAT(scene_refusal("<scale>1e200 1 1</scale><scale>1e200 1 1</scale>" + kShowPart), Contains("too far apart"));
   CHECK_THAT(refusal("x.ply", "ply"), Contains("expected a name that ends in .stl, .obj or .dae"));
 }
 

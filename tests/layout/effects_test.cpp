@@ -214,6 +214,7 @@ TEST_CASE("effects that make no sense are refused, each by its place", "[effects
   refused([&](Effects& e) { e.servos = {{.row = leader, .stiffness = 1, .max_force = kNaN}}; }, "servos[0]", "max_force is nan");
   refused([&](Effects& e) { e.limits = {{leader, 1, -1, 0}}; }, "limits[0]", "lower is 1");
   refused([&](Effects& e) { e.limits = {{leader, kNaN, 1, 0}}; }, "limits[0]", "lower is nan");
+  refused([&](Effects& e) { e.limits = {{leader, kInfinity, kInfinity, 0}}; }, "limits[0]", "may only be at inf");
   refused([&](Effects& e) { e.limits = {{leader, -1, 1, 1.5}}; }, "limits[0]", "restitution is 1.5");
   refused([&](Effects& e) { e.torques = {{leader, {{0, 2, 1}, {0, 0, 0}}}}; }, "torques[0]", "comes after 2 s");
   refused([&](Effects& e) { e.torques = {{leader, {{0, 1}, {0}}}}; }, "torques[0]", "2 times and 1 values");

@@ -557,6 +557,12 @@ TEST_CASE("a bad file gets one message with its name, the line, what was found, 
          for (int i = 0; i < 200'000; ++i) deep += "<a>";
          return deep;
        }()},
+      {"attributes without end", 3, "the element here has more than 200 attributes; expected an element of URDF",
+       [] {
+         std::string crowded = "<robot name=\"r\">\n<!-- \" -->\n<link ";
+         for (int i = 0; i < 300'000; ++i) crowded += fmt::format("a{}='' ", i);
+         return crowded + "/></robot>";
+       }()},
       {"only a comment", 1, "holds no element", "<!-- nothing -->"},
       {"SDF", 2, "the outermost element is <sdf>", text({"<?xml version=\"1.0\"?>", "<sdf version=\"1.6\"/>"})},
       {"nameless robot", 1, "<robot> has no name", "<robot><link name=\"a\"/></robot>"},
@@ -664,6 +670,69 @@ TEST_CASE("what only the builder can judge names the file too") {
   const std::string light = R"(<link name="b"/>)";
   REQUIRE_THAT(message_of(robot(link("a") + light + joint("j", "continuous", "a", "b"))),
                StartsWith("test.urdf: joint \"j\" moves nothing that resists"));
+}
+
+TEST_CASE("numbers that are too large together are refused for what they are") {
+  const auto heavy = [](const std::string& mass, const std::string& moment) {
+    return fmt::format(R"(<link name="b"><inertial><origin xyz="1 0 0"/><mass value="{0}"/>)"
+                       R"(<inertia ixx="{1}" iyy="{1}" izz="{1}"/></inertial></link>)",
+                       mass, moment);
+  };
+  const auto message_with = [&](const std::string& links, const std::string& joints) {
+    return message_of(robot(link("a") + links + joints));
+  };
+  const std::string turns = joint("j", "continuous", "a", "b");
+  const std::string far = R"(<origin xyz="1.5e308 0 0"/>)";
+  const std::string shape = "<collision>" + far + R"(<geometry><sphere radius="1"/></geometry></collision>)";
+  CHECK_THAT(message_with(heavy("1", "1e308"), turns),
+             StartsWith("test.urdf: joint \"j\": link \"b\" and all below it are too heavy or too large for numbers; expected "));
+  CHECK_THAT(message_with(heavy("1e308", "1") + link("c"), turns + joint("k", "prismatic", "b", "c", far)),
+             Contains("too heavy or too large"));
+  CHECK_THAT(message_with(link("b") + link("c"), joint("j", "fixed", "a", "b", far) + joint("k", "continuous", "b", "c", far)),
+             StartsWith("test.urdf: joint \"k\": it lies too far from the world for numbers; expected metres; "));
+  CHECK_THAT(message_with(link("b") + link("c", shape), turns + joint("k", "fixed", "b", "c", far)),
+             StartsWith("test.urdf: link \"c\": a collision shape lies too far away for numbers; expected metres; "));
+  CHECK_THAT(message_with(link("b") + link("c") + link("d"),
+                          turns + joint("k", "continuous", "b", "c", R"(<mimic joint="j" multiplier="1e200"/>)") +
+                              joint("l", "continuous", "c", "d", R"(<mimic joint="k" multiplier="1e200"/>)")),
+             StartsWith("test.urdf: joint \"l\" follows \"j\" by a multiplier of inf and an offset of 0"));
+}
+
+TEST_CASE("a row of 20,000 followers is resolved link by link, from either end") {
+  constexpr int kJoints = 20'000;
+  std::string xml = "<robot name=\"r\">" + link("l0");
+  for (int i = 1; i <= kJoints; ++i) {
+    const std::string mimic = i < kJoints ? fmt::format(R"(<mimic joint="j{}" multiplier="-1" offset="1"/>)", i + 1) : "";
+    const std::string name = fmt::format("l{}", i);
+    xml += link(name) + joint(fmt::format("j{}", i), "continuous", fmt::format("l{}", i - 1), name, mimic);
+  }
+  const Model model = parse(xml + "</robot>");
+  REQUIRE(model.mimics.size() == kJoints - 1);
+  // each turns its leader's sign about
+  for (const Mimic& mimic : model.mimics) {
+    const bool odd = (mimic.leader_slot - mimic.follower_slot) % 2 == 1;
+    REQUIRE(mimic.leader_slot == kJoints);
+    REQUIRE(mimic.multiplier == (odd ? -1 : 1));
+    REQUIRE(mimic.offset == (odd ? 1 : 0));
+  }
+}
+
+TEST_CASE("names of any length and kind are cut and kept on one line in messages") {
+  const std::string name = "a&#10;" + std::string(5'000, 'b');
+  const std::string massless = R"(<link name=")" + name + R"("/>)";
+  const std::string message = message_of(robot(link("r") + massless + joint(name, "continuous", "r", name)));
+  CHECK_THAT(message, Contains("joint \"a b") && Contains("bbb...\" moves nothing"));
+  CHECK(message.find('\n') == message.npos);
+  CHECK(message.size() < 500);
+  // umlauts stay whole where a name is cut
+  std::string umlauts = "x";
+  for (int i = 0; i < 50; ++i) umlauts += "ü";
+  CHECK_THAT(message_of(robot(link("r") + link("c") + joint(umlauts, "continuos", "r", "c"))), Contains("üü...\""));
+}
+
+TEST_CASE("a file without end is refused") {
+  if (!std::filesystem::exists("/dev/zero")) return;
+  REQUIRE_THROWS_WITH(load_urdf("/dev/zero"), StartsWith("/dev/zero: it is longer than ") && Contains("; expected a URDF"));
 }
 
 TEST_CASE("a loop of many links is named in a few words") {

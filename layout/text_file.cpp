@@ -1,0 +1,38 @@
+#include "layout/text_file.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+#include "layout/input_error.hpp"
+
+namespace linden {
+
+std::string read_text(const std::string& file, const std::string& what, std::size_t most_bytes) {
+  std::error_code ignored;
+  const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+  if (!std::filesystem::exists(status))
+    throw InputError(fmt::format("{}: there is no such file; expected {}; check the path", file, what));
+  if (std::filesystem::is_directory(status)) {
+    throw InputError(fmt::format("{}: this is a folder; expected {}; name a file in it", file, what));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(fmt::format("{}: it cannot be opened; expected {}; check its permissions", file, what));
+  constexpr std::size_t kChunk = 1 << 16;
+  std::string text;
+  while (stream) {
+    const std::size_t before = text.size();
+    text.resize(before + kChunk);
+    stream.read(text.data() + before, kChunk);
+    text.resize(before + static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > most_bytes) {
+      throw InputError(
+          fmt::format("{}: it is longer than {} bytes; expected {}; check that it is the right file", file, most_bytes, what));
+    }
+  }
+  return text;
+}
+
+}  // namespace linden
