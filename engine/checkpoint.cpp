@@ -11,17 +11,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
 #include "engine/output_file.hpp"
 #include "engine/simulation.hpp"
 #include "layout/input_error.hpp"
+#include "layout/words.hpp"
 
 namespace linden {
 namespace {
 
 constexpr std::string_view kMagic = "linden checkpoint 2\n";
+constexpr std::int64_t kMostSteps = std::int64_t{1} << 53;  // beyond it their count times the step has no double of its own
 
 struct Header {
   std::uint64_t model_hash;
@@ -94,10 +97,10 @@ void Simulation::load(const std::string& file) {
   if (bytes.size() < body + sizeof(std::uint64_t)) throw InputError(fmt::format("{}: the checkpoint is cut short", file));
   std::memcpy(&header, bytes.data() + kMagic.size(), sizeof(Header));
   if (header.model_hash != model_->hash()) {
-    throw InputError(fmt::format("{}: this checkpoint belongs to another model ({} positions, {} velocities) than \"{}\" ({}, {}), or "
-                                 "to one with other masses or lengths",
-                                 file, header.positions, header.velocities, model_->names.model, model_->tree.shape.positions,
-                                 model_->tree.shape.velocities));
+    throw InputError(fmt::format("{}: this checkpoint belongs to another model ({} positions, {} velocities) than {} ({}, {}), "
+                                 "or to one with other masses or lengths",
+                                 file, header.positions, header.velocities, quoted(model_->names.model),
+                                 model_->tree.shape.positions, model_->tree.shape.velocities));
   }
   if (header.order != options_.order) {
     throw InputError(fmt::format("{}: this checkpoint was made with order {}; the simulation has order {}, so it would not continue the "
@@ -126,14 +129,24 @@ void Simulation::load(const std::string& file) {
   if (bytes.size() != expected || sum != checksum(std::string_view(bytes).substr(0, bytes.size() - sizeof(sum)))) {
     throw InputError(fmt::format("{}: the checkpoint is damaged or cut short ({} bytes, expected {})", file, bytes.size(), expected));
   }
+  const auto impossible = [&](const std::string& what) {
+    throw InputError(fmt::format("{}: the checkpoint holds {}; expected what a simulation saved; save it again", file, what));
+  };
+  if (header.steps < 0 || header.steps > kMostSteps) impossible(fmt::format("{} steps", header.steps));
+  if (header.history < 0 || header.history > kHistory) impossible(fmt::format("the displacements of {} steps", header.history));
   const char* next = bytes.data() + body;
   State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) {
     std::memcpy(field.flat().data(), next, field.bytes());
     next += field.bytes();
   });
+  for (const auto& numbers : {loaded.q.flat(), loaded.p.flat(), loaded.history.flat()}) {
+    const bool finite = std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
+    if (!finite) impossible("a number that is not finite");
+  }
   for (Past& one : past) {
     std::int64_t rows = 0;
     std::memcpy(&rows, next, sizeof(rows));
+    if (rows < 0 || rows > kHistory) impossible(fmt::format("the displacements of {} steps", rows));
     one.rows = static_cast<int>(rows);
     std::memcpy(one.history.flat().data(), next + sizeof(rows), one.history.bytes());
     next += sizeof(rows) + one.history.bytes();

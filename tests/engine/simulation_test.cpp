@@ -1,5 +1,7 @@
 // State in, state out, mimic joints, checkpoints.
 #include <cmath>
+#include <cstring>
+#include <limits>
 
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
@@ -112,6 +114,36 @@ TEST_CASE("a checkpoint that does not fit is refused and changes nothing") {
   CHECK_THROWS_WITH(simulation.save(folder.file("no/such/folder")), Catch::Contains("cannot be written"));
   CHECK(simulation.steps() == 10);
   simulation.load(folder.file("state"));
+}
+
+TEST_CASE("a checkpoint that no simulation saved is refused though its checksum is right") {
+  const Folder folder;
+  Simulation simulation(chain(5), {.step = 1e-3, .order = 4});
+  run(simulation, 10);
+  simulation.save(folder.file("state"));
+  const std::string good = text_of(folder / "state");
+  const std::size_t header = good.find('\n') + 1, state = header + 88, past = state + 8 * (5 + 5 + 5 * 5 + 2);
+  const auto message_with = [&](std::size_t at, auto value) {
+    std::string bytes = good.substr(0, good.size() - 8);
+    std::memcpy(bytes.data() + at, &value, sizeof(value));
+    std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
+    for (const char byte : bytes) sum = (sum ^ static_cast<unsigned char>(byte)) * 1099511628211ull;
+    bytes.append(reinterpret_cast<const char*>(&sum), sizeof(sum));
+    folder.write("other", bytes);
+    try {
+      simulation.load(folder.file("other"));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  CHECK_THAT(message_with(header + 56, std::int64_t{-1}), Catch::Contains("other: the checkpoint holds -1 steps; expected "));
+  CHECK_THAT(message_with(header + 56, std::numeric_limits<std::int64_t>::max()), Catch::Contains("steps; expected "));
+  CHECK_THAT(message_with(header + 64, std::int64_t{6}), Catch::Contains("the displacements of 6 steps"));
+  CHECK_THAT(message_with(state, std::nan("")), Catch::Contains("a number that is not finite"));
+  CHECK_THAT(message_with(past, std::int64_t{1'000'000}), Catch::Contains("the displacements of 1000000 steps"));
+  CHECK(message_with(header + 56, std::int64_t{7}) == "nothing was thrown");
+  CHECK(simulation.steps() == 7);
 }
 
 TEST_CASE("states of the wrong size or with bad numbers are refused by name") {
