@@ -1,0 +1,17 @@
+// Bytes read as STL, as OBJ and as COLLADA have a finite box each, or are refused.
+#include "layout/mesh_box.hpp"
+#include "tests/fuzz/input.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
+  using namespace linden;
+  static const InputFolder folder;
+  const std::string bytes = text_of(data, size);
+  for (const char* name : {"mesh.stl", "mesh.obj", "mesh.dae"}) {
+    folder.write(name, bytes);
+    read_or_refuse([&] {
+      const MeshBox box = mesh_box(folder.file(name));
+      require(!box.isEmpty() && box.sizes().allFinite() && box.center().allFinite(), "the box of a mesh");
+    });
+  }
+  return 0;
+}

@@ -1,0 +1,12 @@
+// URDF text becomes a sound model with either base, or is refused.
+#include "layout/urdf.hpp"
+#include "tests/fuzz/sound_model.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
+  using namespace linden;
+  const std::string xml(text_of(data, size));
+  read_or_refuse([&] {
+    for (const Base base : {Base::fixed, Base::floating}) require_sound(parse_urdf(xml, "robot.urdf", base));
+  });
+  return 0;
+}

@@ -1,0 +1,41 @@
+// tests/fuzz/sound_model.hpp
+// What holds of every model, whatever it was read from.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "layout/model.hpp"
+#include "tests/fuzz/input.hpp"
+
+namespace linden {
+
+inline void require_sound(const Model& model) {
+  const Tree& tree = model.tree;
+  const auto slots = static_cast<std::size_t>(tree.shape.slots);
+  require(tree.bodies() > 0, "no body moves");
+  require(model.names.body.size() == slots && model.names.joint.size() == slots, "names of bodies and joints");
+  require(model.names.position.size() == static_cast<std::size_t>(tree.shape.positions), "names of positions");
+  require(model.names.velocity.size() == static_cast<std::size_t>(tree.shape.velocities), "names of velocities");
+  for (Index i = 1; i < tree.shape.slots; ++i) {
+    require(tree.parent(i) >= 0 && tree.parent(i) < i, "a parent comes after its child");
+  }
+  model.constants.each(model.constants, [](const char* name, const auto& field, Rows, const char*) {
+    require(std::ranges::all_of(field.flat(), [](double value) { return std::isfinite(value); }), name);
+  });
+  model.attributes.each(model.attributes, [](const char* name, const auto& field, Rows, const char*) {
+    require(std::ranges::none_of(field.flat(), [](double value) { return std::isnan(value); }), name);
+  });
+  for (const Mimic& mimic : model.mimics) {
+    require(std::isfinite(mimic.multiplier) && std::isfinite(mimic.offset), "a mimic's numbers");
+    require(mimic.leader_slot > 0 && mimic.leader_slot != mimic.follower_slot, "a mimic's leader");
+  }
+  for (const auto& [link, place] : model.names.link) {
+    require(place.slot >= 0 && place.slot < tree.shape.slots && place.in_body.matrix().allFinite(), "the place of a link");
+  }
+  for (const BodyShape& shape : model.shapes) {
+    require(shape.slot > 0 && shape.slot < tree.shape.slots && shape.pose.matrix().allFinite(), "the place of a shape");
+  }
+}
+
+}  // namespace linden
