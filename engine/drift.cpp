@@ -15,8 +15,7 @@ Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], 
 
 /// Whether no joint ties any body to the world: all roots are carried by free joints.
 bool floats(const Tree& tree) {
-  const auto tied = [&](const Run& run) { return run.kind != JointKind::free && tree.level(run.begin) == 1; };
-  return std::ranges::none_of(tree.runs, tied);
+  return std::ranges::all_of(tree.roots(), [&](Index root) { return tree.kind(root) == JointKind::free; });
 }
 
 /// Nothing moved and nothing drifted: 0.

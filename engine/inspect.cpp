@@ -111,11 +111,9 @@ std::map<std::string, Index> counts_of(const std::vector<BodyFacts>& bodies) {
 }
 
 Index widest_level(const Tree& tree) {
-  Index widest = 0;
-  for (std::size_t l = 1; l + 1 < tree.level_begin.size(); ++l) {
-    widest = std::max(widest, tree.level_begin[l + 1] - tree.level_begin[l]);
-  }
-  return widest;
+  std::vector<Index> bodies(static_cast<std::size_t>(tree.levels()), 0);
+  for (Index i = 1; i < tree.shape.slots; ++i) bodies[static_cast<std::size_t>(tree.level(i))] += 1;
+  return *std::ranges::max_element(bodies);
 }
 
 /// The sweeps of a step, and what all of it costs on this machine.

@@ -21,11 +21,9 @@ struct Roots {
 
 Roots roots_of(const Model& model) {
   Roots roots;
-  for (const Run& run : model.tree.runs) {
-    for (Index i = run.begin; i < run.end && model.tree.level(i) == 1; ++i) {
-      roots.all += 1;
-      roots.free += run.kind == JointKind::free ? 1 : 0;
-    }
+  for (const Index root : model.tree.roots()) {
+    roots.all += 1;
+    roots.free += model.tree.kind(root) == JointKind::free ? 1 : 0;
   }
   return roots;
 }

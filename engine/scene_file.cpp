@@ -166,12 +166,8 @@ class SceneReader {
     if (free == 0 || free < roots(model)) entrant.placed.pose = entrant.base.pose();
   }
 
-  static std::size_t roots(const Model& model) {
-    return static_cast<std::size_t>(model.tree.level_begin[2] - model.tree.level_begin[1]);
-  }
-
   void remember_bases(const Entrant& entrant, const PlacedModel& part) {
-    const bool moved = floating_roots(part.model).size() < roots(part.model);
+    const bool moved = floating_roots(part.model).size() < part.model.tree.roots().size();
     for (const Index slot : floating_roots(part.model)) {
       const std::string& joint = part.model.names.joint[static_cast<std::size_t>(slot)];
       BaseStart start = entrant.base;

@@ -167,12 +167,8 @@ BaseStart read_base(const SceneValue& at) {
 }
 
 std::vector<Index> floating_roots(const Model& model) {
-  std::vector<Index> slots;
-  for (const Run& run : model.tree.runs) {
-    for (Index i = run.begin; i < run.end && model.tree.level(i) == 1; ++i) {
-      if (run.kind == JointKind::free) slots.push_back(i);
-    }
-  }
+  std::vector<Index> slots = model.tree.roots();
+  std::erase_if(slots, [&](Index root) { return model.tree.kind(root) != JointKind::free; });
   return slots;
 }
 

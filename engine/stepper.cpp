@@ -195,13 +195,13 @@ void Stepper::approach_softly(Evaluated& now, double& norm, double h, bool whole
     displacement_map(model_.tree, work_.motion, work_.delta);
     effects_->soften(creep, work_.delta);
     now = sweeps_->evaluate(report);
-    norm = sweeps_->factor_and_pass(now, report);
+    norm = now.norm;
     for (int k = 0; k < kMostSoftCorrections; ++k) {
       if (!now.usable() || !std::isfinite(norm)) return;
       const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
       if (revise_effects(settled, false)) {
         now = sweeps_->evaluate(report);
-        norm = sweeps_->factor_and_pass(now, report);
+        norm = now.norm;
         continue;
       }
       if (to_the_end ? converged(now, norm, h) || sweeps_->at_rounding_floor(now, norm, fall(h), kFloorEpsilons) : settled) break;
@@ -212,7 +212,7 @@ void Stepper::approach_softly(Evaluated& now, double& norm, double h, bool whole
       for (int cut = 0; cut < kMaxBacktracks; ++cut) {
         double share = 0.5;
         if (now.usable()) {
-          norm = sweeps_->pass_up(now);
+          norm = now.norm;
           const double slope = sweeps_->slope_along(before_innovation_);
           if (slope > -kSteepest * slope_before) break;
           share = std::clamp(slope_before / (slope_before - slope), 0.1, 0.9);
@@ -220,7 +220,10 @@ void Stepper::approach_softly(Evaluated& now, double& norm, double h, bool whole
         now = sweeps_->correct(taken * (share - 1), report);
         taken *= share;
       }
-      if (now.usable()) norm = sweeps_->factor_and_pass_again(now, report);
+      if (now.usable()) {
+        sweeps_->factor_again(now, report);
+        norm = now.norm;
+      }
     }
   }
 }
@@ -236,7 +239,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     for (double& value : work_.delta.flat()) value = 0;
     now = sweeps_->evaluate(report);
   }
-  double norm = sweeps_->factor_and_pass(now, report);
+  double norm = now.norm;
   bool fresh = true;  // the factor belongs to the current displacement
   StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
 
@@ -253,10 +256,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
   };
   const auto try_out = [&](const Evaluated& tried) {
     now = tried;
-    if (now.usable()) {
-      const double squared = sweeps_->pass_up(now);
-      if (std::isfinite(squared)) return squared;
-    }
+    if (now.usable()) return now.norm;
     trouble = now.least_w > 0 ? StepStatus::not_finite : StepStatus::past_pi;
     report.slot = worst_displacement(model_, work_);
     return kInfinity;
@@ -274,7 +274,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
       revisions += 1;
       displacement_map(model_.tree, work_.motion, work_.delta);
       now = sweeps_->evaluate(report);
-      norm = sweeps_->factor_and_pass(now, report);
+      norm = now.norm;
       return fresh = true;
     }
     if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision) return false;
@@ -282,7 +282,7 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     revisions += 1;
     report.iterations += 1;
     now = sweeps_->evaluate(report);
-    norm = sweeps_->factor_and_pass(now, report);
+    norm = now.norm;
     fresh = true;
     return true;
   };
@@ -330,7 +330,8 @@ StepStatus Stepper::find_root(const State<double>& state, int history, double h,
     }
     fresh = false;
     if (slow && options_.solver == Solver::newton) {
-      norm = sweeps_->factor_and_pass_again(now, report);
+      sweeps_->factor_again(now, report);
+      norm = now.norm;
       fresh = true;
     }
   }
@@ -352,7 +353,7 @@ void Stepper::finish(State<double>& state, int& history, double h) {
   for (const Mimic& mimic : sweeps_->mimics()) {
     state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
-  sweeps_->refresh(state.q);
+  sweeps_->arrive(state.q, h, state.p);
   state.pace(0, 1) = 0.5 * (work_at_begin + work(work_.force));
   if (effects_) {
     // an impact may take in one step what the next gives back
@@ -363,8 +364,6 @@ void Stepper::finish(State<double>& state, int& history, double h) {
   } else {
     state.pace(0, 0) = kinetic_;
   }
-  momentum_update_map(tree, sweeps_->constants(), h, work_.displacement, work_.impulse,
-                      sweeps_->left(), work_.force, state.p);
   if (joints) {
     for (Index row = 0; row < tree.shape.velocities; ++row) state.p(row) += work_.increment(row);
   }

@@ -3,12 +3,13 @@
 // cache. What a solution is, and what to do where there is none, is the stepper's business (stepper.hpp).
 //
 //   evaluate                  delta -> motion, displacement, h mu              DRNEA, downward half
-//   pass_up                   residual and first half of a solve, its norm     DRNEA, upward half
-//   factor_and_pass           the same with a fresh Jacobian (riqn: the articulated inertia), factored on the way
-//   solve_and_correct         second half of the solve, and the next evaluation
+//                             Jacobian (riqn: articulated inertia), factored
+//                             residual and first half of a solve, its norm     DRNEA, upward half
+//   solve_and_correct         second half of the solve, and the next evaluation with the factor there is
 //
-// One upward sweep does pass_up where no joint is tied to another and nobody asks for |r|; else residual, ties and solve go one by one.
-// Effects, where there are any, act in each evaluation and factor.
+// One upward sweep finds residual and norm where no joint is tied to another and nobody asks for |r|; else residual, ties and solve go one
+// by one. Effects, where there are any, act in each evaluation and factor; where there are none, each branch of the tree is gone through
+// down and up before the next. What an evaluation finds where a body turned too far is not usable.
 #pragma once
 
 #include <span>
@@ -24,10 +25,11 @@
 namespace linden {
 
 struct Evaluated {
-  double least_w;  // see displacement_down
-  double energy;   // h^2 x kinetic energy of the mean motion
-  double plain;    // |h r|^2
-  double scale;    // what a residual is compared with: energy, with effects also what gravity gives in a step
+  double least_w = 1;  // see displacement_down
+  double energy = 0;   // h^2 x kinetic energy of the mean motion
+  double plain = 0;    // |h r|^2
+  double norm = 0;     // squared energy norm of the residual
+  double scale = 0;    // what a residual is compared with: energy, with effects also what gravity gives in a step
   bool usable() const;
 };
 
@@ -46,6 +48,8 @@ class TreeSweeps {
 
   /// Placements, forces and potentials at q.
   void refresh(const Field<double>& q);
+  /// The same at the end of a step of h, and its momenta p.
+  void arrive(const Field<double>& q, double h, Field<double>& p);
   /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
   double potential() const { return potential_; }
   double effect_potential() const { return effect_potential_; }
@@ -55,13 +59,10 @@ class TreeSweeps {
 
   /// Before the evaluations of a step. known: the step before is one of these sweeps; scale: see Evaluated.
   void begin(bool known, double scale);
+  /// With a fresh factor.
   Evaluated evaluate(StepReport& report);
-  /// Squared energy norm of the residual of an evaluation.
-  double pass_up(Evaluated& now);
-  /// The same with a fresh factor.
-  double factor_and_pass(Evaluated& now, StepReport& report);
-  /// The same for an evaluation that was passed up already.
-  double factor_and_pass_again(Evaluated& now, StepReport& report);
+  /// A fresh factor for the evaluation made last.
+  void factor_again(Evaluated& now, StepReport& report);
   /// The evaluation after a correction by what the factor makes of the residual.
   Evaluated solve_and_correct(StepReport& report);
   /// The evaluation after the correction applied last, times `factor`.
@@ -84,17 +85,18 @@ class TreeSweeps {
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
 
  private:
-  template <class Action>
-  void in_parts_down(const Action& action) const;
-  template <class Action>
-  void in_parts_up(const Action& action) const;
+  template <class Then>
+  void refresh_and(const Field<double>& q, const Then& then);
   template <class Motions>
-  Evaluated evaluate_motions(StepReport& report, const Motions& motions);
+  Evaluated evaluate_motions(StepReport& report, bool fresh, const Motions& motions);
+  template <class Added>
+  double pass_part(Slots part, bool fresh, const Added& added);
   template <class Action>
   void with_added(const Action& action);
   void act(Evaluated& now);
-  void forces();
-  void factor(StepReport& report);
+  void forces(Slots part);
+  void pass_up(Evaluated& now, bool fresh);
+  void factor();
   void factor_mass();
   void tie_rates();
   double pass_residual();

@@ -7,6 +7,7 @@
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.2, without the symmetry
 #pragma once
 
+#include "kernels/body_lanes.hpp"
 #include "kernels/joints.hpp"
 #include "kernels/small_matrix.hpp"
 
@@ -59,6 +60,31 @@ LINDEN_INLINE Wrench<S> load_column(const S* column) {
   return {{column[0], column[3], column[6]}, {column[18], column[21], column[24]}};
 }
 
+/// Takes a screw out of A, 36 numbers stored as a Mat6, and stores its gains: of one body, or of several with a body in every lane.
+template <class Bodies, class S, class Element, class Added>
+LINDEN_INLINE void eliminate_screw(Bodies bodies, const Tree& tree, const BodyConstants<Element>& constants, Index i,
+                                   const typename Bodies::Scalar* A, const Gains<S>& gains, typename Bodies::Scalar* felt, const Added& added) {
+  using B = typename Bodies::Scalar;
+  const Index row = tree.first_v(i);
+  const Screw<B> screw = gather<Screw>(bodies, constants.screw, i);
+  const Wrench<B> U = screw.r * load_column(A + column_start(2)) + screw.t * load_column(A + column_start(5));
+  B d = screw.r * U.n.z + screw.t * U.f.z;
+  if constexpr (Added::to_joints) d = d + gather_row(bodies, added.stiffness, row);
+  const B inverse = B(1.0) / d;
+  const Wrench<B> up = inverse * U;
+  const Twist<B> W = screw.r * load_row(A + row_start(2)) + screw.t * load_row(A + row_start(5));
+  scatter(bodies, gains.up, row, up);
+  scatter(bodies, gains.down, row, inverse * W);
+  scatter_row(bodies, gains.inverse, tree.first_block(i), inverse);
+  const auto take_out = [&](int at, const B& share) LINDEN_INLINE_LAMBDA { store_row(felt + at, load_row(A + at) - share * W); };
+  take_out(row_start(0), up.n.x);
+  take_out(row_start(1), up.n.y);
+  take_out(row_start(2), up.n.z);
+  take_out(row_start(3), up.f.x);
+  take_out(row_start(4), up.f.y);
+  take_out(row_start(5), up.f.z);
+}
+
 /// Takes the joint of body i out of A, 36 numbers stored as a Mat6, and stores its gains. What is left for the parent to feel: of a free
 /// joint nothing, of a ball joint that moves freely a force alone. Effects act on screws and ball joints.
 template <JointKind Kind, class S, class Element, class Added>
@@ -67,23 +93,7 @@ LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyCons
   const Index row = tree.first_v(i), block = tree.first_block(i);
   const S zero(0.0), one(1.0);
   if constexpr (Kind == JointKind::screw) {
-    const Screw<S> screw = load_screw<S>(constants, i);
-    const Wrench<S> U = screw.r * load_column(A + column_start(2)) + screw.t * load_column(A + column_start(5));
-    S d = screw.r * U.n.z + screw.t * U.f.z;
-    if constexpr (Added::to_joints) d = d + added.stiffness(row);
-    const S inverse = one / d;
-    const Wrench<S> up = inverse * U;
-    const Twist<S> W = screw.r * load_row(A + row_start(2)) + screw.t * load_row(A + row_start(5));
-    store(gains.up, row, up);
-    store(gains.down, row, inverse * W);
-    gains.inverse(block) = inverse;
-    const auto take_out = [&](int at, const S& share) LINDEN_INLINE_LAMBDA { store_row(felt + at, load_row(A + at) - share * W); };
-    take_out(row_start(0), up.n.x);
-    take_out(row_start(1), up.n.y);
-    take_out(row_start(2), up.n.z);
-    take_out(row_start(3), up.f.x);
-    take_out(row_start(4), up.f.y);
-    take_out(row_start(5), up.f.z);
+    eliminate_screw(OneBody<S>{}, tree, constants, i, A, gains, felt, added);
   } else if constexpr (Kind == JointKind::ball) {
     const auto M = Mat6<S>::from(A);
     std::array<S, 9> flat;

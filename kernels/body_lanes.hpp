@@ -1,18 +1,20 @@
 // kernels/body_lanes.hpp
-// Maps over the bodies of one tree: a body in every lane.
+// Maps over the bodies of one tree, and scans where its levels are wide: a body in every lane.
 //
 //   for_bodies<S>(begin, end, [&](auto bodies, Index i) {        // S: what the fields hold
 //     const auto D = gather<Displacement>(bodies, displacement, i);
 //     scatter(bodies, twist, i, log(D));
 //   });
 //
-// `bodies` is ManyBodies, i ... i + W - 1 in the lanes of a BodyPack, and at the end OneBody.
+// `bodies` is ManyBodies, i ... i + W - 1 in the lanes of a BodyPack, and at the end OneBody. A scan goes by for_abreast_down or _up:
+// ManyBodies are of one level there, so none is the parent of another; gather_at reads the rows of their parents.
 //
 // Rows of a field lie one behind the other, so W of them are turned (rows into lanes) as they are read and written: some 3 shuffles a
 // number and W bodies at W = 8. Where the lanes hold instances already (S is a pack) there is nothing to turn and the map goes body by
 // body.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <xsimd/xsimd.hpp>
@@ -65,12 +67,12 @@ LINDEN_INLINE std::array<R, W> transposed(const std::array<R, W>& r) {
   }
 }
 
-/// Rows 0 ... W - 1 of C numbers each -> C packs.
-template <int C>
-LINDEN_INLINE void rows_to_lanes(const double* rows, BodyPack* lanes) {
+/// W rows of C numbers each -> C packs; row_of(l): where row l begins.
+template <int C, class RowOf>
+LINDEN_INLINE void rows_to_lanes(const RowOf& row_of, BodyPack* lanes) {
   for (int at = 0; at < C; at += kBodies) {
     Square square;
-    for (int l = 0; l < kBodies; ++l) square[static_cast<std::size_t>(l)] = read(rows + l * C + at);
+    for (int l = 0; l < kBodies; ++l) square[static_cast<std::size_t>(l)] = read(row_of(l) + at);
     square = transposed(square);
     for (int k = 0; k < kBodies && at + k < C; ++k) {
       std::memcpy(&lanes[at + k], &square[static_cast<std::size_t>(k)], sizeof(Register));
@@ -119,15 +121,73 @@ LINDEN_INLINE void for_bodies(Index begin, Index end, const Action& action) {
   for (; i < end; ++i) action(OneBody<S>{}, i);
 }
 
+/// Whether bodies i ... i + W - 1 are all of one level.
+LINDEN_INLINE bool abreast(const Tree& tree, Index i) {
+  const Index* const level = tree.level.row(i);
+  if (level[0] != level[kBodies - 1]) return false;
+  bool same = true;
+  for (int l = 1; l < kBodies; ++l) same &= level[l] == level[0];
+  return same;
+}
+
+/// Whether each of some slots has a level of its own, as along a chain.
+LINDEN_INLINE bool in_file(const Tree& tree, Slots slots) {
+  return tree.level(slots.end - 1) - tree.level(slots.begin) == slots.end - 1 - slots.begin;
+}
+
+/// Of slots that hold one kind of joint: many(ManyBodies, i) where a register of them is abreast, few(part) for what lies between, root to
+/// leaves.
+template <class Many, class Few>
+LINDEN_INLINE void for_abreast_down(const Tree& tree, Slots slots, const Many& many, const Few& few) {
+  const auto wide = [&](Index i) LINDEN_INLINE_LAMBDA { return i + kBodies <= slots.end && abreast(tree, i); };
+  if (in_file(tree, slots)) return few(slots);
+  for (Index i = slots.begin; i < slots.end;) {
+    if (wide(i)) {
+      many(ManyBodies{}, i);
+      i += kBodies;
+    } else {
+      const Index begin = i++;
+      while (i < slots.end && !wide(i)) ++i;
+      few(Slots{begin, i});
+    }
+  }
+}
+
+/// The same, leaves to root.
+template <class Many, class Few>
+LINDEN_INLINE void for_abreast_up(const Tree& tree, Slots slots, const Many& many, const Few& few) {
+  const auto wide = [&](Index end) LINDEN_INLINE_LAMBDA { return end - kBodies >= slots.begin && abreast(tree, end - kBodies); };
+  if (in_file(tree, slots)) return few(slots);
+  for (Index i = slots.end; i > slots.begin;) {
+    if (wide(i)) {
+      i -= kBodies;
+      many(ManyBodies{}, i);
+    } else {
+      const Index end = i--;
+      while (i > slots.begin && !wide(i)) --i;
+      few(Slots{i, end});
+    }
+  }
+}
+
 template <template <class> class Value, int Components>
 LINDEN_INLINE Value<BodyPack> gather(ManyBodies, const Field<double, Components>& field, Index i) {
   std::array<BodyPack, Components> lanes;
-  turning::rows_to_lanes<Components>(field.row(i), lanes.data());
+  const double* const rows = field.row(i);
+  turning::rows_to_lanes<Components>([&](int l) LINDEN_INLINE_LAMBDA { return rows + l * Components; }, lanes.data());
   return Value<BodyPack>::from(lanes.data());
 }
 template <template <class> class Value, class S, class Element, int Components>
 LINDEN_INLINE Value<S> gather(OneBody<S>, const Field<Element, Components>& field, Index i) {
   return load<Value, S>(field, i);
+}
+
+/// Rows at[0], ..., at[W - 1].
+template <template <class> class Value, int Components>
+LINDEN_INLINE Value<BodyPack> gather_at(ManyBodies, const Field<double, Components>& field, const Index* at) {
+  std::array<BodyPack, Components> lanes;
+  turning::rows_to_lanes<Components>([&](int l) LINDEN_INLINE_LAMBDA { return field.row(at[l]); }, lanes.data());
+  return Value<BodyPack>::from(lanes.data());
 }
 
 template <int Components, class Value>
@@ -173,6 +233,13 @@ LINDEN_INLINE void store_rows(OneBody<double>, const double* numbers, double* ro
   for (int k = 0; k < Room; ++k) rows[k] = k < C ? numbers[k] : 0.0;
 }
 
+/// An index of each body, as a number.
+LINDEN_INLINE BodyPack at_bodies(ManyBodies, const Field<Index>& field, Index i) {
+  std::array<double, static_cast<std::size_t>(kBodies)> numbers;
+  for (int l = 0; l < kBodies; ++l) numbers[static_cast<std::size_t>(l)] = field(i + l);
+  return BodyPack::load_unaligned(numbers.data());
+}
+
 /// Which of the bodies sit on an odd level.
 LINDEN_INLINE auto odd_levels(ManyBodies, const Tree& tree, Index i) {
   std::array<double, static_cast<std::size_t>(kBodies)> odd;
@@ -180,6 +247,27 @@ LINDEN_INLINE auto odd_levels(ManyBodies, const Tree& tree, Index i) {
   return BodyPack::load_unaligned(odd.data()) > BodyPack(0.5);
 }
 LINDEN_INLINE bool odd_levels(OneBody<double>, const Tree& tree, Index i) { return tree.level(i) % 2 != 0; }
+
+/// To row at[l] of a field the numbers of lane l are added, the last lane first.
+template <int Components, class Value>
+LINDEN_INLINE void add_at(ManyBodies bodies, Field<double, Components>& field, const Index* at, const Value& value) {
+  constexpr int room = (Components + kBodies - 1) / kBodies * kBodies;
+  std::array<BodyPack, Components> lanes;
+  value.to(lanes.data());
+  alignas(kAlignment) double rows[room * kBodies];
+  store_rows<Components, room>(bodies, lanes.data(), rows, room);
+  for (int l = kBodies - 1; l >= 0; --l) {
+    double* const to = field.row(at[l]);
+    for (int k = 0; k < Components; ++k) to[k] += rows[l * room + k];
+  }
+}
+
+/// Least of the bodies.
+LINDEN_INLINE double least_of(ManyBodies, const BodyPack& value) {
+  std::array<double, static_cast<std::size_t>(kBodies)> numbers;
+  value.store_unaligned(numbers.data());
+  return std::ranges::min(numbers);
+}
 
 /// Sum over the bodies.
 LINDEN_INLINE double summed(ManyBodies, const BodyPack& value) { return xsimd::hadd(value); }

@@ -34,31 +34,45 @@ void gravity_field_down(const Tree& tree, const Field<S, 12>& placement, const V
   gravity_field_down(tree, placement, gravity, all_slots(tree), field);
 }
 
+template <class S>
+S gravity_potential(const Field<S, 3>& field, const Field<S, 3>& first_moment) {
+  return -dot(load<Vec3, S>(field, 0), load<Vec3, S>(first_moment, 0));
+}
+
+/// slots: all, or parts of a large tree from its end to its beginning.
 template <class S, class Element>
-S gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
-                   const Field<S, 3>& field, Field<S, 3>& first_moment, Field<S>& force) {
+void gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
+                      const Field<S, 3>& field, Slots slots, Field<S, 3>& first_moment, Field<S>& force) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-  for (Index i = 0; i < tree.shape.slots; ++i) store(first_moment, i, zero);  // first what the children add
-  Vec3<S> waiting = zero;  // from a child to the parent that comes next
-  up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+  const auto left_for = [&](Index i) LINDEN_INLINE_LAMBDA { return tree.is_leaf(i) != 0 ? zero : load<Vec3, S>(first_moment, i); };
+  if (slots.begin == slots.end) return;
+  Vec3<S> waiting = left_for(slots.end - 1);  // what the children of the body that comes next pass to it
+  up(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const Vec3<S> own{as<S>(constants.inertia(i, 1)), as<S>(constants.inertia(i, 2)), as<S>(constants.inertia(i, 3))};
-    const Vec3<S> c = load<Vec3, S>(first_moment, i) + own + waiting;
+    const Vec3<S> c = own + waiting;
     store(first_moment, i, c);
     const auto g = load<Vec3, S>(field, i);
     const S mass = as<S>(constants.subtree_mass(i));
     store_joint(joint, force, tree.first_v(i), project(joint, constants, i, Wrench<S>{cross(c, g), mass * g}));
     const auto X = load<Placement, S>(placement, i);
     const Vec3<S> passed = X.R * c + mass * X.p;
+    // a parent that comes next and has no other child takes it from the registers
     const Index parent = tree.parent(i);
-    if (parent == i - 1) {
+    const bool first = tree.is_last_child(i) != 0;
+    if (parent == i - 1 && first && i > slots.begin) {
       waiting = passed;
-    } else {
-      waiting = zero;
-      store(first_moment, parent, load<Vec3, S>(first_moment, parent) + passed);
+      return;
     }
+    store(first_moment, parent, first ? passed : load<Vec3, S>(first_moment, parent) + passed);
+    if (i > slots.begin) waiting = left_for(i - 1);
   });
-  store(first_moment, 0, load<Vec3, S>(first_moment, 0) + waiting);
-  return -dot(load<Vec3, S>(field, 0), load<Vec3, S>(first_moment, 0));
+}
+
+template <class S, class Element>
+S gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
+                   const Field<S, 3>& field, Field<S, 3>& first_moment, Field<S>& force) {
+  gravity_force_up(tree, constants, placement, field, all_slots(tree), first_moment, force);
+  return gravity_potential(field, first_moment);
 }
 
 }  // namespace linden

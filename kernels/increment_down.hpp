@@ -13,6 +13,7 @@
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3, pass 3, for impulses
 #pragma once
 
+#include "kernels/body_lanes.hpp"
 #include "kernels/impulse_pass_up.hpp"
 
 namespace linden {
@@ -42,15 +43,38 @@ void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const
                 const Field<S>& innovation, Slots slots, Field<S, 6>& variation, Field<S>& increment) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   if (slots.begin == 1) store(variation, 0, Twist<S>{zero, zero});
-  auto eta = load<Twist, S>(variation, slots.begin - 1);  // of the body before, often the parent
-  down(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
-    const Index row = tree.first_v(i), parent = tree.parent(i);
-    if (parent != i - 1) eta = load<Twist, S>(variation, parent);
-    const Twist<S> xi = to_child(placement_of(joint, i), eta);
-    const Wrench<S> delta = joint_increment(joint, tree, gains, i, load_joint(joint, innovation, row), xi);
-    store_joint(joint, increment, row, delta);
-    eta = add_motion(joint, constants, i, delta, xi);
-    store(variation, i, eta);
+  const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    auto eta = load<Twist, S>(variation, part.begin - 1);  // of the body before, often the parent
+    for (Index i = part.begin; i < part.end; ++i) {
+      const Index row = tree.first_v(i), parent = tree.parent(i);
+      if (parent != i - 1) eta = load<Twist, S>(variation, parent);
+      const Twist<S> xi = to_child(placement_of(joint, OneBody<S>{}, i), eta);
+      const Wrench<S> delta = joint_increment(joint, tree, gains, i, load_joint(joint, innovation, row), xi);
+      store_joint(joint, increment, row, delta);
+      eta = add_motion(joint, constants, i, delta, xi);
+      store(variation, i, eta);
+    }
+  };
+  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    if constexpr (joint == JointKind::screw && std::is_same_v<S, double>) {
+      const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
+        const Index row = tree.first_v(i);
+        const auto above = gather_at<Twist>(bodies, variation, tree.parent.row(i));
+        const auto xi = to_child(placement_of(joint, bodies, i), above);
+        const auto gain = gather<Twist>(bodies, gains.down, row);
+        const auto delta = gather_row(bodies, gains.inverse, tree.first_block(i)) * gather_row(bodies, innovation, row) -
+                           (dot(gain.w, xi.w) + dot(gain.v, xi.v));
+        scatter_row(bodies, increment, row, delta);
+        const auto screw = gather<Screw>(bodies, constants.screw, i);
+        auto next = xi;
+        next.w.z = xi.w.z + screw.r * delta;
+        next.v.z = xi.v.z + screw.t * delta;
+        scatter(bodies, variation, i, next);
+      };
+      for_abreast_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+    } else {
+      one_by_one(joint, part);
+    }
   });
 }
 
@@ -58,8 +82,8 @@ template <class S, class Element>
 void increment_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                     const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Slots slots,
                     Field<S, 6>& variation, Field<S>& increment) {
-  const auto placement_of = [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
-    return after_motion(joint, load<Placement, S>(placement, i), load<Displacement, S>(motion, i));
+  const auto placement_of = [&](auto joint, auto bodies, Index i) LINDEN_INLINE_LAMBDA {
+    return after_motion(joint, gather<Placement>(bodies, placement, i), gather<Displacement>(bodies, motion, i));
   };
   yield_down(tree, constants, placement_of, gains, innovation, slots, variation, increment);
 }
@@ -74,7 +98,7 @@ void increment_down(const Tree& tree, const BodyConstants<Element>& constants, c
 template <class S, class Element>
 void rate_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
                const Field<S>& innovation, Field<S, 6>& variation, Field<S>& rate) {
-  const auto placement_of = [&](auto, Index i) { return load<Placement, S>(placement, i); };
+  const auto placement_of = [&](auto, auto bodies, Index i) LINDEN_INLINE_LAMBDA { return gather<Placement>(bodies, placement, i); };
   yield_down(tree, constants, placement_of, gains, innovation, all_slots(tree), variation, rate);
 }
 

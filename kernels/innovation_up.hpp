@@ -17,6 +17,7 @@
 // source  the paper, Algorithm 2, lines 8 and 9; Featherstone, Rigid Body Dynamics Algorithms, 7.3
 #pragma once
 
+#include "kernels/body_lanes.hpp"
 #include "kernels/evaluate_down.hpp"
 #include "kernels/impulse_pass_up.hpp"
 #include "kernels/newton_factor_up.hpp"
@@ -44,6 +45,11 @@ class Climbing {
     store(impulse_, i, sum);
     return sum;
   }
+  /// Bodies up to i are next, several at once: all that goes up is to be in memory.
+  LINDEN_INLINE void unload(Index i) {
+    store(impulse_, i, load<Wrench, S>(impulse_, i) + waiting_);
+    waiting_ = none_;
+  }
   LINDEN_INLINE void pass(const Tree& tree, Index i, const Wrench<S>& passed) {
     const Index parent = tree.parent(i);
     if (parent == i - 1 && i > end_) {
@@ -67,13 +73,34 @@ template <class S, class Element>
   if (slots.end == tree.shape.slots) clear_world(work.impulse);
   Climbing<S> climbing(work.impulse, slots);
   S norm(0.0);
-  up(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
-    const Index row = tree.first_v(i);
-    const Wrench<S> E = climbing.arrived(i);
-    const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
-    store_joint(joint, work.innovation, row, u);
-    const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
-    climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, i), passed));
+  const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    for (Index i = part.end - 1; i >= part.begin; --i) {
+      const Index row = tree.first_v(i);
+      const Wrench<S> E = climbing.arrived(i);
+      const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
+      store_joint(joint, work.innovation, row, u);
+      const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
+      climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, i), passed));
+    }
+  };
+  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    if constexpr (joint == JointKind::screw && std::is_same_v<S, double>) {
+      const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
+        using std::abs;
+        climbing.unload(i + kBodies - 1);
+        const Index row = tree.first_v(i);
+        const auto E = gather<Wrench>(bodies, work.impulse, i);
+        const auto screw = gather<Screw>(bodies, constants.screw, i);
+        const auto u = screw.r * E.n.z + screw.t * E.f.z - gather_row(bodies, work.momentum_target, row);
+        scatter_row(bodies, work.innovation, row, u);
+        norm = norm + summed(bodies, abs(u * gather_row(bodies, gains.inverse, tree.first_block(i)) * u));
+        const auto passed = E - u * gather<Wrench>(bodies, gains.up, row);
+        add_at(bodies, work.impulse, tree.parent.row(i), to_parent(gather<Placement>(bodies, work.placement, i), passed));
+      };
+      for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+    } else {
+      one_by_one(joint, part);
+    }
   });
   return norm;
 }

@@ -31,19 +31,27 @@ LINDEN_INLINE void with_joint(JointKind kind, Body&& body) {
   }
 }
 
-/// Slots [begin, end) of a tree: all of them, or as many as the nearest cache holds.
-struct Slots {
-  Index begin, end;
-};
 inline Slots all_slots(const Tree& tree) { return {1, tree.shape.slots}; }
 
 /// stretch(joint, slots) for every stretch of one kind, root to leaves.
 template <class Stretch>
 LINDEN_INLINE void stretches(const Tree& tree, Slots slots, Stretch&& stretch) {
-  for (const Run& run : tree.runs) {
-    const Slots part{std::max(run.begin, slots.begin), std::min(run.end, slots.end)};
-    if (part.begin >= part.end) continue;
+  for (Index begin = slots.begin; begin < slots.end;) {
+    const Run& run = tree.runs[static_cast<std::size_t>(tree.run(begin))];
+    const Slots part{begin, std::min(run.end, slots.end)};
     with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
+    begin = part.end;
+  }
+}
+
+/// The same, leaves to root.
+template <class Stretch>
+LINDEN_INLINE void stretches_up(const Tree& tree, Slots slots, Stretch&& stretch) {
+  for (Index end = slots.end; end > slots.begin;) {
+    const Run& run = tree.runs[static_cast<std::size_t>(tree.run(end - 1))];
+    const Slots part{std::max(run.begin, slots.begin), end};
+    with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
+    end = part.begin;
   }
 }
 
@@ -64,13 +72,9 @@ LINDEN_INLINE void down(const Tree& tree, Body&& body) {
 /// body(joint, i) for slots end - 1 ... begin, leaves to root.
 template <class Body>
 LINDEN_INLINE void up(const Tree& tree, Slots slots, Body&& body) {
-  for (auto run = tree.runs.rbegin(); run != tree.runs.rend(); ++run) {
-    const Slots part{std::max(run->begin, slots.begin), std::min(run->end, slots.end)};
-    if (part.begin >= part.end) continue;
-    with_joint(run->kind, [&](auto joint) LINDEN_INLINE_LAMBDA {
-      for (Index i = part.end - 1; i >= part.begin; --i) body(joint, i);
-    });
-  }
+  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    for (Index i = part.end - 1; i >= part.begin; --i) body(joint, i);
+  });
 }
 
 /// body(joint, i) for every slot but the world, leaves to root.

@@ -31,9 +31,9 @@ void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum,
 
 template <class S, class Element>
 void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Field<S, 7>& displacement,
-                         const Field<S, 6>& impulse, const Field<S>& residual, const Field<S>& force, Field<S>& momentum) {
+                         const Field<S, 6>& impulse, const Field<S>& residual, const Field<S>& force, Slots slots, Field<S>& momentum) {
   const S rate = S(1.0) / h, half = S(0.5) * h;
-  stretches(tree, all_slots(tree), [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
@@ -53,6 +53,12 @@ void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constan
       }
     }
   });
+}
+
+template <class S, class Element>
+void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Field<S, 7>& displacement,
+                         const Field<S, 6>& impulse, const Field<S>& residual, const Field<S>& force, Field<S>& momentum) {
+  momentum_update_map(tree, constants, h, displacement, impulse, residual, force, all_slots(tree), momentum);
 }
 
 }  // namespace linden

@@ -88,54 +88,120 @@ LINDEN_INLINE Rows6 pass_joint(Joint<Kind> joint, const Tree& tree, const BodyCo
   return by_columns ? rows : turned_over(rows);  // the parent is held the other way
 }
 
+/// Screws i ... i + W - 1 of one level, each in a lane: their gains, and to their parents what they pass.
+template <bool ByColumns, class Added>
+void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
+                    const Field<double, 7>& motion, const Field<double, 7>& displacement, Index i,
+                    Field<double, kRowNumbers>& articulated, const Gains<double>& gains, const Added& added) {
+  constexpr ManyBodies bodies;
+  /// Where number k of row `line` is in a Mat6.
+  const auto place = [](bool by_columns, int line, int k) LINDEN_INLINE_LAMBDA {
+    return by_columns ? row_start(k) + column_start(line) : row_start(line) + column_start(k);
+  };
+  BodyPack A[36], felt[36];
+  const auto u = log(gather<Displacement>(bodies, displacement, i));
+  const auto G = gather<Inertia>(bodies, constants.inertia, i);
+  pose_derivative(G, u, G * u).to(A);
+  settle();
+  if constexpr (Added::to_bodies) {
+    BodyPack pull[36];
+    turning::rows_to_lanes<36>([&](int l) LINDEN_INLINE_LAMBDA { return added.pull.row(i + l); }, pull);
+    for (int k = 0; k < 36; ++k) A[k] = A[k] + pull[k];
+  }
+  if (const Index* const leaf = tree.is_leaf.row(i); !std::all_of(leaf, leaf + kBodies, [](Index flag) { return flag != 0; })) {
+    const auto has_children = at_bodies(bodies, tree.is_leaf, i) < BodyPack(0.5);
+    for (int line = 0; line < 6; ++line) {
+      BodyPack left[6];
+      turning::rows_to_lanes<6>([&](int l) LINDEN_INLINE_LAMBDA { return articulated.row(i + l) + 8 * line; }, left);
+      for (int k = 0; k < 6; ++k) {
+        BodyPack& number = A[place(ByColumns, line, k)];
+        number = select(has_children, number + left[k], number);
+      }
+    }
+  }
+  settle();
+  eliminate_screw(bodies, tree, constants, i, A, gains, felt, added);
+  settle();
+  const auto X = gather<Placement>(bodies, placement, i);
+  const auto X_pose = after_motion(Joint<JointKind::screw>{}, X, gather<Displacement>(bodies, motion, i));
+  to_parent(X, X_pose, felt, [&](int at, const BodyPack& value) LINDEN_INLINE_LAMBDA { A[at] = value; });
+  settle();
+  alignas(kAlignment) double passed[kBodies * kRowNumbers];
+  for (int line = 0; line < 6; ++line) {
+    BodyPack numbers[6];
+    for (int k = 0; k < 6; ++k) numbers[k] = A[place(!ByColumns, line, k)];
+    store_rows<6, 8>(bodies, numbers, passed + 8 * line, kRowNumbers);
+  }
+  for (Index l = kBodies - 1; l >= 0; --l) {
+    const double* const from = passed + l * kRowNumbers;
+    double* const kept = articulated.row(tree.parent(i + l));
+    const bool first = tree.is_last_child(i + l) != 0;
+    for (int k = 0; k < 48; k += 8) store_row8(kept + k, first ? load_row8(from + k) : load_row8(from + k) + load_row8(kept + k));
+  }
+}
+
 template <class Added = NothingAdded>
 void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
                       const Field<double, 7>& motion, const Field<double, 7>& displacement, Slots slots,
                       Field<double, kRowNumbers>& articulated, const Gains<double>& gains, const Added& added = {}) {
   constexpr Index kTile = 32;  // 12 KiB of K
   alignas(kAlignment) double K[kTile * kRowNumbers];
-  Index tile = slots.end;
   const auto left_for = [&](Index i) LINDEN_INLINE_LAMBDA {
     Rows6 rows{};
     if (tree.is_leaf(i) != 0) return rows;
     for (int k = 0; k < 6; ++k) rows.r[k] = load_row8(articulated.row(i) + 8 * k);
     return rows;
   };
-  Rows6 waiting = left_for(slots.end - 1);  // what the children of the body that comes next pass to it
-  up(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
-    if (i < tile) {
-      tile = std::max(slots.begin, i + 1 - kTile);
-      pose_derivative_rows(tree, constants, displacement, tile, i + 1, K);
+  const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    Index tile = part.end;
+    Rows6 waiting = left_for(part.end - 1);  // what the children of the body that comes next pass to it
+    for (Index i = part.end - 1; i >= part.begin; --i) {
+      if (i < tile) {
+        // whole registers, even where some of them are not needed
+        tile = std::max(slots.begin, i + 1 - std::min(kTile, (i - part.begin) / kBodies * kBodies + kBodies));
+        pose_derivative_rows(tree, constants, displacement, tile, i + 1, K);
+      }
+      Rows6 A;
+      for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + waiting.r[k];
+      const bool by_columns = tree.level(i) % 2 != 0;
+      if constexpr (Added::to_bodies) {
+        const Rows6 pull = rows_of(added.pull.row(i));
+        const Rows6 turned = by_columns ? turned_over(pull) : pull;
+        for (int k = 0; k < 6; ++k) A.r[k] += turned.r[k];
+      }
+      const auto X = load<Placement, double>(placement, i);
+      const auto X_pose = after_motion(joint, X, load<Displacement, double>(motion, i));
+      Rows6 passed;
+      if constexpr (joint == JointKind::screw) {
+        double after[12];
+        X_pose.to(after);
+        passed = by_columns ? pass_screw<true>(tree, constants, i, A, placement.row(i), after, gains, added)
+                            : pass_screw<false>(tree, constants, i, A, placement.row(i), after, gains, added);
+      } else {
+        passed = pass_joint(joint, tree, constants, i, by_columns, A, X, X_pose, gains, added);
+      }
+      // a parent that comes next and has no other child takes it from the registers
+      const Index parent = tree.parent(i);
+      const bool first = tree.is_last_child(i) != 0;
+      if (parent == i - 1 && first && i > part.begin) {
+        waiting = passed;
+        continue;
+      }
+      double* const kept = articulated.row(parent);
+      for (int k = 0; k < 6; ++k) store_row8(kept + 8 * k, first ? passed.r[k] : passed.r[k] + load_row8(kept + 8 * k));
+      if (i > part.begin) waiting = left_for(i - 1);
     }
-    Rows6 A;
-    for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + waiting.r[k];
-    if constexpr (Added::to_bodies) {
-      const Rows6 pull = rows_of(added.pull.row(i));
-      const Rows6 turned = tree.level(i) % 2 != 0 ? turned_over(pull) : pull;
-      for (int k = 0; k < 6; ++k) A.r[k] += turned.r[k];
-    }
-    const auto X = load<Placement, double>(placement, i);
-    const auto X_pose = after_motion(joint, X, load<Displacement, double>(motion, i));
-    const bool by_columns = tree.level(i) % 2 != 0;
-    Rows6 passed;
+  };
+  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
-      double after[12];
-      X_pose.to(after);
-      passed = by_columns ? pass_screw<true>(tree, constants, i, A, placement.row(i), after, gains, added)
-                          : pass_screw<false>(tree, constants, i, A, placement.row(i), after, gains, added);
+      const auto many = [&](auto, Index i) LINDEN_INLINE_LAMBDA {
+        const auto factor = tree.level(i) % 2 != 0 ? factor_abreast<true, Added> : factor_abreast<false, Added>;
+        factor(tree, constants, placement, motion, displacement, i, articulated, gains, added);
+      };
+      for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {
-      passed = pass_joint(joint, tree, constants, i, by_columns, A, X, X_pose, gains, added);
+      one_by_one(joint, part);
     }
-    // a parent that comes next and has no other child takes it from the registers
-    const Index parent = tree.parent(i);
-    const bool first = tree.is_last_child(i) != 0;
-    if (parent == i - 1 && first && i > slots.begin) {
-      waiting = passed;
-      return;
-    }
-    double* const kept = articulated.row(parent);
-    for (int k = 0; k < 6; ++k) store_row8(kept + 8 * k, first ? passed.r[k] : passed.r[k] + load_row8(kept + 8 * k));
-    if (i > slots.begin) waiting = left_for(i - 1);
   });
 }
 

@@ -5,7 +5,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <unordered_set>
 
@@ -32,7 +31,6 @@ constexpr double kMovesNothing = 1e-14;
 struct Body {
   std::string link, joint;
   int parent = -1;
-  Index level = 1;
   JointKind kind = JointKind::screw;
   double turn = 0, shift = 0;
   Isometry3d placement;  // body frame at q = 0 in the parent's body frame
@@ -245,7 +243,6 @@ class Build {
     body.joint = link.joint + part;
     body.link = part.empty() ? link.name : body.joint;  // the massless bodies within a planar joint have no link of their own
     body.parent = parent;
-    body.level = parent < 0 ? 1 : bodies_[static_cast<std::size_t>(parent)].level + 1;
     body.kind = kind;
     body.turn = turn;
     body.shift = shift;
@@ -261,16 +258,15 @@ class Build {
   }
 
   void sort_bodies() {
-    std::vector<int> sorted(bodies_.size());
-    std::iota(sorted.begin(), sorted.end(), 0);
-    std::stable_sort(sorted.begin(), sorted.end(), [&](int a, int b) {
-      const Body& left = bodies_[static_cast<std::size_t>(a)];
-      const Body& right = bodies_[static_cast<std::size_t>(b)];
-      return std::pair(left.level, left.kind) < std::pair(right.level, right.kind);
-    });
+    std::vector<Index> parent;
+    std::vector<JointKind> kind;
+    for (const Body& body : bodies_) {
+      parent.push_back(body.parent);
+      kind.push_back(body.kind);
+    }
     slot_of_body_.resize(bodies_.size());
     body_in_slot_.assign(1, -1);
-    for (const int body : sorted) {
+    for (const Index body : sorted_bodies(parent, kind)) {
       slot_of_body_[static_cast<std::size_t>(body)] = static_cast<Index>(body_in_slot_.size());
       body_in_slot_.push_back(body);
     }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <tuple>
 #include <unordered_set>
 
 #include "layout/input_error.hpp"
@@ -17,7 +16,6 @@ namespace {
 struct Origin {
   std::size_t part;
   Index slot;
-  Index level;
   JointKind kind;
 };
 
@@ -42,6 +40,9 @@ class Merger {
   Index slot_of(std::size_t part, Index slot) const { return new_slot_[part][static_cast<std::size_t>(slot)]; }
 
   void sort_bodies() {
+    std::vector<Origin> bodies;
+    std::vector<Index> parent;
+    std::vector<JointKind> kind;
     for (std::size_t part = 0; part < parts_.size(); ++part) {
       const Tree& tree = parts_[part].model.tree;
       if (!parts_[part].pose.matrix().allFinite()) {
@@ -49,14 +50,17 @@ class Merger {
                                      quoted(parts_[part].name)));
       }
       new_slot_.emplace_back(static_cast<std::size_t>(tree.shape.slots), 0);
-      for (const Run& run : tree.runs) {
-        for (Index i = run.begin; i < run.end; ++i) order_.push_back({part, i, tree.level(i), run.kind});
+      const auto before = static_cast<Index>(bodies.size());
+      for (Index i = 1; i < tree.shape.slots; ++i) {
+        bodies.push_back({part, i, tree.kind(i)});
+        parent.push_back(tree.parent(i) == 0 ? -1 : before + tree.parent(i) - 1);
+        kind.push_back(tree.kind(i));
       }
     }
-    std::ranges::stable_sort(
-        order_, [](const Origin& a, const Origin& b) { return std::tie(a.level, a.kind) < std::tie(b.level, b.kind); });
-    for (std::size_t k = 0; k < order_.size(); ++k) {
-      new_slot_[order_[k].part][static_cast<std::size_t>(order_[k].slot)] = static_cast<Index>(k) + 1;
+    for (const Index body : sorted_bodies(parent, kind)) {
+      const Origin& origin = bodies[static_cast<std::size_t>(body)];
+      order_.push_back(origin);
+      new_slot_[origin.part][static_cast<std::size_t>(origin.slot)] = static_cast<Index>(order_.size());
     }
   }
 
