@@ -38,6 +38,19 @@ void find_branches(Tree& tree) {
   }
 }
 
+/// As few rows as the bodies need that wait at the same time, and those that were used last.
+void share_rows(Tree& tree) {
+  std::vector<Index> free;
+  Index rows = 0;
+  for (Index i = tree.shape.slots - 1; i > 0; --i) {
+    if (tree.is_leaf(i) == 0) free.push_back(tree.waiting(i));
+    if (tree.is_last_child(i) == 0) continue;
+    if (free.empty()) free.push_back(rows++);
+    tree.waiting(tree.parent(i)) = free.back();
+    free.pop_back();
+  }
+}
+
 }  // namespace
 
 Index Tree::levels() const { return *std::ranges::max_element(level.flat()) + 1; }
@@ -84,6 +97,7 @@ Tree Tree::from_sorted(const std::vector<Index>& parent, const std::vector<Joint
     tree.is_last_child(i) = tree.is_leaf(tree.parent(i));
     tree.is_leaf(tree.parent(i)) = 0;
   }
+  share_rows(tree);
   find_branches(tree);
   return tree;
 }

@@ -68,6 +68,7 @@ struct Run {
   FIELD(Index, first_q, 1, slots, "first row of this joint in arrays of positions")            \
   FIELD(Index, first_block, 1, slots, "first row of this joint's nv x nv block")               \
   FIELD(Index, is_leaf, 1, slots, "1 where a body has no children, else 0")                    \
+  FIELD(Index, waiting, 1, slots, "row for what children pass while a sweep goes up; free again once the body has been met") \
   FIELD(Index, is_last_child, 1, slots, "1 where no child of the same parent comes after: the first that an upward sweep meets")
 
 struct Tree {
