@@ -163,7 +163,7 @@ class SceneReader {
       entrant.at.fail(fmt::format("{} has a velocity, but its base is fixed", entrant.at.path()), "a floating base",
                       "write base: floating, or leave it out");
     }
-    if (free == 0 || free < roots(model)) entrant.placed.pose = entrant.base.pose();
+    if (free == 0 || free < model.tree.roots().size()) entrant.placed.pose = entrant.base.pose();
   }
 
   void remember_bases(const Entrant& entrant, const PlacedModel& part) {

@@ -6,7 +6,7 @@
 //   +-> motion_map      M = exp(S delta)
 //   |   displacement_down, momentum_map                         DRNEA, downward half
 //   |   newton_factor_up (once a step) or articulated_inertia_up (riqn)
-//   |   innovation_up (or residual_up, impulse_pass_up)         DRNEA, upward half: h r(delta); its energy norm: converged?
+//   |   innovation_up (or residual_up, impulse_pass_up)         DRNEA, upward half: h r(delta); its energy norm: usable? converged?
 //   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
 //   advance_map, placement_map, gravity, momentum_update_map
 //

@@ -130,17 +130,15 @@ LINDEN_INLINE bool abreast(const Tree& tree, Index i) {
   return same;
 }
 
-/// Whether each of some slots has a level of its own, as along a chain.
-LINDEN_INLINE bool in_file(const Tree& tree, Slots slots) {
-  return tree.level(slots.end - 1) - tree.level(slots.begin) == slots.end - 1 - slots.begin;
-}
+/// Whether such bodies are to be found near slot i: not so along a chain or in a humanoid.
+LINDEN_INLINE bool is_wide(const Tree& tree, Index i) { return tree.runs[static_cast<std::size_t>(tree.run(i))].widest >= kBodies; }
 
 /// Of slots that hold one kind of joint: many(ManyBodies, i) where a register of them is abreast, few(part) for what lies between, root to
 /// leaves.
 template <class Many, class Few>
 LINDEN_INLINE void for_abreast_down(const Tree& tree, Slots slots, const Many& many, const Few& few) {
   const auto wide = [&](Index i) LINDEN_INLINE_LAMBDA { return i + kBodies <= slots.end && abreast(tree, i); };
-  if (in_file(tree, slots)) return few(slots);
+  if (!is_wide(tree, slots.begin)) return few(slots);
   for (Index i = slots.begin; i < slots.end;) {
     if (wide(i)) {
       many(ManyBodies{}, i);
@@ -157,7 +155,7 @@ LINDEN_INLINE void for_abreast_down(const Tree& tree, Slots slots, const Many& m
 template <class Many, class Few>
 LINDEN_INLINE void for_abreast_up(const Tree& tree, Slots slots, const Many& many, const Few& few) {
   const auto wide = [&](Index end) LINDEN_INLINE_LAMBDA { return end - kBodies >= slots.begin && abreast(tree, end - kBodies); };
-  if (in_file(tree, slots)) return few(slots);
+  if (!is_wide(tree, slots.begin)) return few(slots);
   for (Index i = slots.end; i > slots.begin;) {
     if (wide(i)) {
       i -= kBodies;

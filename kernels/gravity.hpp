@@ -39,7 +39,7 @@ S gravity_potential(const Field<S, 3>& field, const Field<S, 3>& first_moment) {
   return -dot(load<Vec3, S>(field, 0), load<Vec3, S>(first_moment, 0));
 }
 
-/// slots: all, or parts of a large tree from its end to its beginning.
+/// slots: all, or parts of a large tree as for innovation_up.
 template <class S, class Element>
 void gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                       const Field<S, 3>& field, Slots slots, Field<S, 3>& first_moment, Field<S>& force) {

@@ -9,7 +9,7 @@
 // reads   screw 2 x n, placement 12 x n, (motion 7 x n,) gains, innovation nv (u)
 // writes  variation 6 x n (eta), increment nv (Delta)
 // slots   [begin, end) in order, begin = 1 first
-// cost    one pass; the bodies of one level are independent
+// cost    one pass; screws of one level fill the lanes where there are enough of them
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3, pass 3, for impulses
 #pragma once
 

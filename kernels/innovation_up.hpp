@@ -1,5 +1,6 @@
 // kernels/innovation_up.hpp
-// The upward half of an evaluation and of a solve in one sweep, for a block of instances: lane = instance.
+// The upward half of an evaluation and of a solve in one sweep. Of a block of instances: lane = instance; of one tree: lane = body, where
+// a level has screws enough.
 //
 //   E_i = h mu_i + sum over children c of Ad_{X_c^-1}^T (E_c - gain_up_c u_c),    u_i = S_i^T E_i - h (p + h/2 Q)_i
 //
@@ -66,7 +67,7 @@ class Climbing {
   Wrench<S> none_, waiting_;
 };
 
-/// slots: all, or parts of a large tree from its end to its beginning.
+/// slots: all, or parts of a large tree in the order of Tree: whatever hangs in other parts has been met before.
 template <class S, class Element>
 [[gnu::noinline]] S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Slots slots, Workspace<S>& work) {
   const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};

@@ -1,7 +1,7 @@
 // layout/merged_models.hpp
 // Several models as one: one system with the roots of all of them, that move as each would alone.
 //
-//   slots      sorted anew by level and kind; within both, models in their order, bodies in theirs
+//   slots      sorted anew (layout/tree.hpp); within level and kind, models in their order, bodies in theirs
 //   names      of links, joints and coordinates begin with the model's name and a slash, "left/elbow"; an empty name adds nothing
 //   pose       moves the roots: what a free root's position counts from as well as where a fixed one sits
 //   shapes     meshes are called by the whole path of their files where the models come from several files

@@ -73,7 +73,7 @@ Tree Tree::from_sorted(const std::vector<Index>& parent, const std::vector<Joint
     tree.shape.blocks += nv * nv;
   }
   tree.allocate(tree.shape);
-  Index q = 0, v = 0, block = 0;
+  Index q = 0, v = 0, block = 0, abreast = 0;
   for (Index i = 1; i < tree.shape.slots; ++i) {
     const Index nv = velocity_count(kind[at(i)]);
     if (parent[at(i)] < 0 || parent[at(i)] >= i) {
@@ -89,7 +89,10 @@ Tree Tree::from_sorted(const std::vector<Index>& parent, const std::vector<Joint
     v += nv;
     block += nv * nv;
     if (tree.runs.empty() || tree.runs.back().kind != kind[at(i)]) tree.runs.push_back({i, i, kind[at(i)]});
-    tree.runs.back().end = i + 1;
+    Run& run = tree.runs.back();
+    abreast = i > run.begin && tree.level(i) == tree.level(i - 1) ? abreast + 1 : 1;
+    run.widest = std::max(run.widest, abreast);
+    run.end = i + 1;
     tree.run(i) = static_cast<Index>(tree.runs.size()) - 1;
   }
   for (Index& flag : tree.is_leaf.flat()) flag = 1;

@@ -57,6 +57,7 @@ struct Run {
   Index begin;
   Index end;
   JointKind kind;
+  Index widest = 1;  // most of them that are of one level
   bool operator==(const Run&) const = default;
 };
 

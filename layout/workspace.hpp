@@ -20,7 +20,7 @@ inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
   FIELD(Scalar, twist, 6, slots, "V: velocity of the body [rad/s, m/s], body frame")                                \
   FIELD(Scalar, turn, 3, slots, "angular part of h V [rad]")                                                           \
   FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
-  FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia, or what of Pi waits for a parent")      \
+  FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia; or what of Pi waits, see Tree::waiting") \
   FIELD(Scalar, gain_up, 6, velocities, "Pi S d^-1, one row a degree of freedom")                                      \
   FIELD(Scalar, gain_down, 6, velocities, "(S^T Pi)^T d^-T, one row a degree of freedom")                              \
   FIELD(Scalar, joint_inverse, 1, blocks, "d^-1, d = S^T Pi S, row by row")                                            \

@@ -76,5 +76,38 @@ TEST_CASE("a map over bodies gives each the same, in a register or alone") {
   CHECK(packed == alone);
 }
 
+TEST_CASE("a scan meets every body once, in order, and several at once only where they are of one level") {
+  for (const Model& model : {chain(30), balanced_tree(100, 3), balanced_tree(2000), random_tree({.bodies = 200, .seed = 5})}) {
+    const Tree& tree = model.tree;
+    for (const Slots slots : {Slots{1, tree.shape.slots}, Slots{2, tree.shape.slots - 3}, Slots{9, 10}}) {
+      std::vector<Index> downward, upward;
+      const auto many = [&](std::vector<Index>& met) {
+        return [&](auto, Index i) {
+          for (Index k = 0; k < kBodies; ++k) {
+            met.push_back(i + k);
+            CHECK(tree.level(i + k) == tree.level(i));
+          }
+        };
+      };
+      const auto few = [&](std::vector<Index>& met) {
+        return [&](Slots part) {
+          CHECK(part.begin < part.end);
+          for (Index i = part.begin; i < part.end; ++i) met.push_back(i);
+        };
+      };
+      for_abreast_down(tree, slots, many(downward), few(downward));
+      CHECK(std::ranges::is_sorted(downward));
+      std::vector<Index> blocks;  // where each of the upward blocks begins
+      for_abreast_up(tree, slots, [&](auto bodies, Index i) { blocks.push_back(i), many(upward)(bodies, i); },
+                     [&](Slots part) { blocks.push_back(part.begin), few(upward)(part); });
+      CHECK(std::ranges::is_sorted(blocks, std::greater<>{}));
+      std::ranges::sort(upward);
+      CHECK(upward == downward);
+      CHECK(static_cast<Index>(downward.size()) == slots.end - slots.begin);
+      CHECK(downward.front() == slots.begin);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace linden

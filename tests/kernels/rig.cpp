@@ -2,6 +2,20 @@
 
 namespace linden {
 
+namespace {
+
+/// Levels of 9 and 18 bodies, more than a register holds; they turn, slide or do both.
+Model wide_tree() {
+  Model model = balanced_tree(28, 9);
+  for (Index i = 1; i < model.tree.shape.slots; ++i) {
+    model.constants.screw(i, 0) = i % 3 == 0 ? 0 : 1;
+    model.constants.screw(i, 1) = i % 3 == 1 ? 0 : 1 - 0.9 * (i % 3 == 2);
+  }
+  return model;
+}
+
+}  // namespace
+
 std::vector<Model> mixed_trees() {
   std::vector<Model> models;
   models.push_back(random_tree({.bodies = 12, .seed = 11}));
@@ -10,6 +24,7 @@ std::vector<Model> mixed_trees() {
   models.push_back(random_tree({.bodies = 10, .seed = 14, .frees = false, .mass_decades = 6}));
   models.push_back(random_tree({.bodies = 9, .seed = 15, .balls = false, .frees = false}));
   models.push_back(random_tree({.bodies = 6, .seed = 16, .screws = false}));
+  models.push_back(wide_tree());
   return models;
 }
 

@@ -38,7 +38,7 @@ using Eigen::VectorXd;
 using reference::PlainBody;
 using reference::PlainTree;
 
-/// Random trees with joints of all kinds: deep, bushy, floating, masses over six decades, no free joints inside.
+/// Random trees with joints of all kinds: deep, bushy, floating, masses over six decades, no free joints inside; one with wide levels.
 std::vector<Model> mixed_trees();
 
 /// What one instance starts from.

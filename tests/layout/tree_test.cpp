@@ -1,0 +1,103 @@
+#include "layout/tree.hpp"
+
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "layout/merged_models.hpp"
+#include "models/generators.hpp"
+
+namespace linden {
+namespace {
+
+std::vector<Model> large_trees() {
+  std::vector<Model> models;
+  models.push_back(balanced_tree(5000));
+  models.push_back(balanced_tree(3000, 7));
+  models.push_back(random_tree({.bodies = 4000, .seed = 1}));
+  models.push_back(chain(2000));
+  models.push_back(humanoids(100));
+  models.push_back(balanced_tree(1 + 3 * kBranch, 3 * kBranch));
+  const Model part = humanoids(30);
+  models.push_back(merged({{part, "a", Pose::Identity()}, {part, "b", Pose::Identity()}}, "two crowds"));
+  return models;
+}
+
+bool sorted(const Tree& tree, Slots slots) {
+  for (Index i = slots.begin + 1; i < slots.end; ++i) {
+    if (std::pair(tree.level(i), tree.kind(i)) < std::pair(tree.level(i - 1), tree.kind(i - 1))) return false;
+  }
+  return true;
+}
+
+TEST_CASE("a large tree is a trunk and branches that hang in themselves or on the trunk") {
+  for (const Model& model : large_trees()) {
+    const Tree& tree = model.tree;
+    INFO(model.names.model);
+    REQUIRE_FALSE(tree.branches.empty());
+    CHECK(tree.trunk.begin == 1);
+    CHECK(sorted(tree, tree.trunk));
+    Index end = tree.trunk.end;
+    for (const Slots branch : tree.branches) {
+      CHECK(branch.begin == end);
+      CHECK(branch.end - branch.begin <= kBranch);
+      end = branch.end;
+      for (Index i = branch.begin; i < branch.end; ++i) {
+        const Index parent = tree.parent(i);
+        if (parent >= tree.trunk.end && (parent < branch.begin || parent >= i)) FAIL("slot " << i << " hangs on slot " << parent);
+      }
+    }
+    CHECK(end == tree.shape.slots);
+  }
+}
+
+TEST_CASE("subtrees of a branch lie level by level, so that its levels are wide") {
+  const Tree tree = balanced_tree(5000).tree;
+  for (const Slots branch : tree.branches) CHECK(sorted(tree, branch));
+  CHECK(tree.branches.size() == 5);
+  CHECK(tree.trunk.end - 1 < 5000 / kTwig * 2);
+}
+
+TEST_CASE("a tree of no more than a branch is sorted by level and kind all through") {
+  for (const Model& model : {balanced_tree(kBranch), random_tree({.bodies = kBranch, .seed = 2}), humanoids(10)}) {
+    const Tree& tree = model.tree;
+    CHECK(tree.branches.empty());
+    CHECK(tree.trunk == Slots{1, tree.shape.slots});
+    CHECK(sorted(tree, tree.trunk));
+  }
+}
+
+TEST_CASE("every slot knows its run, and the roots are those that hang on the world") {
+  for (const Model& model : large_trees()) {
+    const Tree& tree = model.tree;
+    Index roots = 0;
+    for (Index i = 1; i < tree.shape.slots; ++i) {
+      const Run& run = tree.runs[static_cast<std::size_t>(tree.run(i))];
+      if (i < run.begin || i >= run.end || run.kind != tree.kind(i)) FAIL("slot " << i);
+      roots += tree.parent(i) == 0 ? 1 : 0;
+    }
+    CHECK(static_cast<Index>(tree.roots().size()) == roots);
+  }
+}
+
+TEST_CASE("no two bodies whose children have passed something share a row while they wait, and rows are few") {
+  for (const Model& model : large_trees()) {
+    const Tree& tree = model.tree;
+    INFO(model.names.model);
+    std::set<Index> taken;
+    std::size_t most = 0;
+    for (Index i = tree.shape.slots - 1; i > 0; --i) {
+      if (tree.is_leaf(i) == 0) CHECK(taken.erase(tree.waiting(i)) == 1);
+      if (tree.is_last_child(i) != 0 && !taken.insert(tree.waiting(tree.parent(i))).second) FAIL("slot " << i);
+      most = std::max(most, taken.size());
+    }
+    CHECK(taken == std::set{tree.waiting(0)});
+    CHECK(most < static_cast<std::size_t>(tree.bodies() / 5));
+  }
+}
+
+TEST_CASE("an order in which a child comes before its parent is refused") {
+  CHECK_THROWS_AS(Tree::from_sorted({0, 2, 0}, {JointKind::screw, JointKind::screw, JointKind::screw}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace linden
