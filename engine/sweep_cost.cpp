@@ -99,9 +99,8 @@ class Bench {
       effects->begin(0.0, options_.step, state_.q, past, history_ >= 2, work_.delta);
       sweeps_.begin(history_ > 0, 0);
     }
-    Evaluated now = sweeps_.evaluate(report);
-    impulse_ = work_.impulse;
-    sweeps_.factor_and_pass(now, report);
+    sweeps_.evaluate(report);
+    momentum_map(model_.tree, model_.constants, work_.displacement, impulse_);  // as it was before it was summed over the subtrees
   }
 
   void list() {
