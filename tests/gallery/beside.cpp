@@ -1,0 +1,7 @@
+#include "tests/gallery/scenario.hpp"
+
+namespace linden {
+
+void run_beside(Report&, const Scenario&, double) {}
+
+}  // namespace linden
