@@ -63,7 +63,7 @@ Study heavy_top() {
   Study study{"heavy-top", {}};
   study.scene.model = LagrangeTop::model();
   const auto q = LagrangeTop::start();
-  const auto v = LagrangeTop::start_velocity();
+  const auto v = LagrangeTop().start_velocity();
   study.scene.initial = {{q.begin(), q.end()}, {v.begin(), v.end()}};
   return study;
 }

@@ -89,7 +89,7 @@ TEST_CASE("Lagrange's top nutates as its elliptic function says, to every order"
   const auto error = [&](int order, double h) {
     Simulation simulation(LagrangeTop::model(), options(order, h));
     const auto q = LagrangeTop::start();
-    const auto v = LagrangeTop::start_velocity();
+    const auto v = LagrangeTop().start_velocity();
     simulation.set_positions(q);
     simulation.set_velocities(v);
     return largest(simulation, 2, 25, LagrangeTop());

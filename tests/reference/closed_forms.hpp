@@ -109,6 +109,8 @@ class FreeBody {
     builder.add(link);
     return builder.build();
   }
+  /// From one turning over to the next [s].
+  long double flip_time() const { return 2 * quarter_period(modulus_) / rate_; }
   /// Angular velocity in the body's frame [rad/s].
   std::array<long double, 3> velocity(long double time) const {
     const Elliptic e = elliptic(rate_ * time, modulus_);
@@ -153,9 +155,11 @@ class FreeBody {
   long double momentum_, rate_, modulus_, middle_;
 };
 
-/// Let go tilted and spinning, without precession: it falls, is caught by its spin, rises again.
+/// Let go tilted and spinning [rad/s], without precession: it falls, is caught by its spin, rises again.
 class LagrangeTop {
  public:
+  explicit LagrangeTop(double spin = 60) : spin_(spin) {}
+
   static Model model() {
     TreeBuilder builder("heavy top");
     LinkSpec link;
@@ -168,20 +172,23 @@ class LagrangeTop {
   }
   /// x y z w
   static std::array<double, 4> start() { return {std::sin(kTilt / 2), 0, 0, std::cos(kTilt / 2)}; }
-  static std::array<double, 3> start_velocity() { return {0, 0, kSpin}; }
+  std::array<double, 3> start_velocity() const { return {0, 0, spin_}; }
+  /// Rate of nutation [rad/s], about, and of precession about the vertical where the axis stands at cosine u.
+  double nutation() const { return static_cast<double>(kAlong * spin_ / (kAcross + kMass * kHeight * kHeight)); }
+  long double precession(long double u) const { return nutation() * (std::cos(static_cast<long double>(kTilt)) - u) / (1 - u * u); }
   /// Cosine of the tilt.
-  static long double upright(long double time) {
+  long double upright(long double time) const {
     const long double A = kAcross + static_cast<long double>(kMass) * kHeight * kHeight,
                       u0 = std::cos(static_cast<long double>(kTilt));
-    const long double beta = 2 * kMass * 9.81L * kHeight / A, a = kAlong * static_cast<long double>(kSpin) / A;
+    const long double beta = 2 * kMass * 9.81L * kHeight / A, a = kAlong * static_cast<long double>(spin_) / A;
     // u'^2 = (u0 - u) (beta (1 - u^2) - a^2 (u0 - u))
     const long double root = std::sqrt(a * a * a * a - 4 * beta * (a * a * u0 - beta));
-    const long double u1 = (a * a - root) / (2 * beta), u3 = (a * a + root) / (2 * beta);
+    const long double u3 = (a * a + root) / (2 * beta), u1 = (a * a * u0 - beta) / (beta * u3);
     const long double k = std::sqrt((u0 - u1) / (u3 - u1)), kappa = std::sqrt(beta * (u3 - u1)) / 2;
     const long double sn = elliptic(quarter_period(k) - kappa * time, k).sn;
     return u1 + (u0 - u1) * sn * sn;
   }
-  static double error(double time, std::span<const double> q) {
+  double error(double time, std::span<const double> q) const {
     const long double x = q[0], y = q[1];
     return std::abs(static_cast<double>(1 - 2 * (x * x + y * y) - upright(time)));
   }
@@ -189,7 +196,9 @@ class LagrangeTop {
  private:
   static constexpr double kMass = 0.5, kHeight = 0.05;    // [kg, m] of the centre of mass above the tip
   static constexpr double kAcross = 4e-4, kAlong = 6e-4;  // [kg m^2] about it
-  static constexpr double kTilt = 0.6, kSpin = 60;        // [rad, rad/s]
+  static constexpr double kTilt = 0.6;                    // [rad]
+
+  double spin_;
 };
 
 }  // namespace linden
