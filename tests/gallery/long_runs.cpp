@@ -1,0 +1,52 @@
+// A million steps: what is kept, and what rounding may do to it.
+//
+// A step rounds the momentum of the whole at every joint by some epsilons, up or down. Over N steps that is a random walk of
+// sqrt(N) such: nothing that rounds can do better without compensating, and a drift, however small a step's, would grow with N.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "layout/urdf.hpp"
+#include "models/generators.hpp"
+#include "tests/gallery/scenario.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+void long_chain(Report& report) {
+  const auto steps = report.pick<std::int64_t>(10'000, 100'000, 1'000'000);
+  Scenario falling = scenario(chain(10), {.step = 1e-3}, steps);
+  falling.every = report.pick(1, 1, 5);
+  const RunRecord record = run(falling);
+  promise_conservation(report, record, steps, true);
+  report.note(fmt::format("{} steps; slope {:.1e} of the largest kinetic energy a second", steps, record.drift.slope() / record.drift.scale()));
+  run_beside(report, falling, record.drift.scale());
+}
+
+void long_humanoid(Report& report) {
+  const auto steps = report.pick<std::int64_t>(3000, 100'000, 1'000'000);
+  Scenario tumbling = scenario(load_urdf(std::string(LINDEN_MODELS_DIR) + "/humanoid.urdf", Base::floating),
+                               {.step = 1e-3, .gravity = {0, 0, 0}}, steps);
+  tumbling.start = random_state(*tumbling.model, 2, 0.5);
+  tumbling.every = report.pick(10, 10, 100);
+  const RunRecord record = run(tumbling);
+  promise_conservation(report, record, steps, report.form() != Form::quick);
+  const double walk = static_cast<double>(tumbling.model->tree.bodies()) * kEpsilon * std::sqrt(static_cast<double>(steps));
+  report.at_most("drift of linear momentum, relative", record.momentum->linear(), walk, "an epsilon a body and step, as a random walk");
+  report.at_most("drift of angular momentum, relative", record.momentum->angular(), walk, "the same");
+  report.note(fmt::format("{} steps; slope {:.1e} of the largest kinetic energy a second", steps, record.drift.slope() / record.drift.scale()));
+  run_beside(report, tumbling, record.drift.scale());
+}
+
+}  // namespace
+
+std::vector<Case> long_cases() {
+  return {
+      {"long-chain", "the ten-link chain for a million steps", long_chain, ""},
+      {"long-humanoid", "a humanoid afloat for a million steps", long_humanoid, ""},
+  };
+}
+
+}  // namespace linden

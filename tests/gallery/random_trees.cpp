@@ -1,0 +1,125 @@
+// Random trees of all kinds of joints, masses over twelve powers of ten: what must hold for any of them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/progress.hpp"
+#include "models/generators.hpp"
+#include "tests/gallery/scenario.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+RandomTree recipe(std::uint64_t seed) {
+  RandomTree tree{.bodies = static_cast<Index>(2 + seed % 30), .seed = seed};
+  tree.screws = seed % 3 != 1;
+  tree.balls = seed % 3 != 2 || seed % 2 == 0;
+  tree.frees = seed % 5 == 0;
+  tree.floating = seed % 2 == 0;
+  tree.mass_decades = static_cast<double>(seed % 13);
+  return tree;
+}
+
+struct Worst {
+  double value = 0;
+  std::uint64_t seed = 0;
+
+  void look(double found, std::uint64_t at) {
+    if (found <= value) return;
+    value = found;
+    seed = at;
+  }
+};
+
+std::vector<double> positions_of(const Simulation& simulation) { return {simulation.positions().begin(), simulation.positions().end()}; }
+
+/// Largest difference of coordinates; a quaternion and its opposite are not the same here, nor need they be.
+double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) most = std::isnan(a[k] - b[k]) ? a[k] - b[k] : std::max(most, std::abs(a[k] - b[k]));
+  return most;
+}
+
+/// Runs 40 steps forward, looking at everything, and 40 back.
+void invariants(Report& report) {
+  const auto seeds = report.pick<std::uint64_t>(60, 2000, 20'000);
+  const int steps = 40;
+  const double tolerance = 1e-12;
+  Worst residual, back, linear, angular, energy;
+  int failed = 0, at_floor = 0;
+  Progress progress(static_cast<std::int64_t>(seeds), 1, "trees");
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    progress.update(static_cast<std::int64_t>(seed), Progress::Clock::now());
+    const RandomTree tree = recipe(seed);
+    Scenario moving = scenario(random_tree(tree), {.step = 1e-3, .tolerance = tolerance}, steps);
+    if (tree.floating) moving.options.gravity = {0, 0, 0};
+    moving.start = random_state(*moving.model, seed, 0.5);
+    Simulation simulation = simulation_of(moving);
+    const std::vector<double> start = positions_of(simulation);
+    const RunRecord record = run(simulation, steps);
+    if (!record.failure.empty()) {
+      failed += 1;
+      report.note(fmt::format("seed {}: {}", seed, record.failure));
+      continue;
+    }
+    at_floor += record.at_floor > 0;
+    residual.look(record.residual, seed);
+    energy.look(record.energy_error / std::max(record.second_order, 1e3 * kEpsilon * record.drift.scale()), seed);
+    if (record.momentum) {
+      linear.look(record.momentum->linear(), seed);
+      angular.look(record.momentum->angular(), seed);
+    }
+    std::vector<double> velocities = simulation.velocities();
+    for (double& v : velocities) v = -v;
+    simulation.set_velocities(velocities);
+    for (int k = 0; k < steps; ++k) {
+      if (!simulation.step().ok()) failed += 1;
+    }
+    back.look(distance(positions_of(simulation), start), seed);
+  }
+  const double walk = std::sqrt(static_cast<double>(steps));
+  report.at_most("steps that failed", failed, 0, "every step has a solution");
+  report.at_most("residual, relative", residual.value, 1e-6, "no step is taken above the ceiling of the floor of rounding (convergence.hpp)");
+  report.at_most("way back off [rad, m]", back.value, 0, "");
+  report.at_most("drift of linear momentum", linear.value, 100 * kEpsilon * walk, "a hundred epsilons a step as a random walk");
+  report.at_most("drift of angular momentum", angular.value, 100 * kEpsilon * walk, "the same");
+  report.at_most("energy error / second order", energy.value, 1, "energy of the change of twists in a step");
+  report.note(fmt::format("{} trees of 2 to 31 bodies; {} ended a step at the floor of rounding; worst seeds: residual {}, way back {}, momentum {} and {}, "
+                          "energy {}",
+                          seeds, at_floor, residual.seed, back.seed, linear.seed, angular.seed, energy.seed));
+}
+
+/// The energy error falls with the square of the step.
+void energy_order(Report& report) {
+  const auto seeds = report.pick<std::uint64_t>(20, 300, 3000);
+  std::vector<double> orders;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const auto error = [&](double h, int steps) {
+      Scenario moving = scenario(random_tree(recipe(seed)), {.step = h, .tolerance = 1e-14}, steps);
+      moving.start = random_state(*moving.model, seed, 0.5);
+      const RunRecord record = run(moving);
+      return record.failure.empty() && record.split == 0 ? record.energy_error / record.drift.scale() : std::nan("");
+    };
+    const double coarse = error(5e-4, 80), fine = error(2.5e-4, 160);
+    if (fine > 1e-11) orders.push_back(std::log2(coarse / fine));  // below it rounding of the energy itself shows
+  }
+  std::ranges::sort(orders);
+  const auto at = [&](double share) { return orders[static_cast<std::size_t>(share * static_cast<double>(orders.size() - 1))]; };
+  report.at_most("|median of the order - 2|", std::abs(at(0.5) - 2), 0.05, "the error of energy is that of the method, of second order");
+  report.note(fmt::format("{} of {} trees move enough to tell; orders {:.2f}, {:.2f}, {:.2f} at 1, 50 and 99 of 100", orders.size(), seeds, at(0.01),
+                          at(0.5), at(0.99)));
+}
+
+}  // namespace
+
+std::vector<Case> random_cases() {
+  return {
+      {"random-trees", "random trees of all kinds, masses over 12 powers of ten", invariants, ""},
+      {"random-orders", "their energy as the step is halved", energy_order, ""},
+  };
+}
+
+}  // namespace linden
