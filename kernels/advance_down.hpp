@@ -40,7 +40,7 @@ template <bool Gravity, class S, class Mask, class Element>
 template <bool Gravity, class S, class Mask, class Element>
 [[gnu::noinline]] S momentum_up(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Mask& moves,
                                 const Field<S>* applied, Workspace<S>& work, Field<S>& p) {
-  const S rate = S(1.0) / h, half = S(0.5) * h;
+  const S half = S(0.5) * h;
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   if constexpr (Gravity) {
     for (Index i = 0; i < tree.shape.slots; ++i) store(work.first_moment, i, zero);
@@ -65,9 +65,9 @@ template <bool Gravity, class S, class Mask, class Element>
     const Wrench<S> left = load_joint(joint, work.innovation, row);
     const auto update = [&](Index at, const S& value) { p(at) = select(moves, value, p(at)); };
     if constexpr (joint == JointKind::screw) {
-      update(row, rate * (now.n.x - left.n.x) + half * force.n.x);
+      update(row, (now.n.x - left.n.x) / h + half * force.n.x);
     } else {
-      const Wrench<S> kept = rate * (now - carried(D, left)) + half * force;
+      const Wrench<S> kept = (now - carried(D, left)) / h + half * force;
       update(row, kept.n.x);
       update(row + 1, kept.n.y);
       update(row + 2, kept.n.z);

@@ -13,6 +13,9 @@
 // tumbling humanoid over 1,000 steps: the relative drift of angular momentum at tolerance 1e-6 falls from 5e-6 to 3e-14, at the default
 // 1e-10 from 7e-10 to 6e-14.
 //
+// What target_map multiplies by h is divided by h again: times 1 / h it would be times 1 + 2e-17 at 1 ms, and the same each step, so
+// that momenta would grow with the number of steps and not with its root (2e-11 after a million).
+//
 // reads   screw 2 x n, displacement 7 x n, impulse 6 x n (h F of the residual), residual nv (h r), force nv (Q), momentum p nv
 // writes  momentum_target nv; momentum p nv [kg m^2/s, kg m/s]
 #pragma once
@@ -32,7 +35,7 @@ void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum,
 template <class S, class Element>
 void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Field<S, 7>& displacement,
                          const Field<S, 6>& impulse, const Field<S>& residual, const Field<S>& force, Slots slots, Field<S>& momentum) {
-  const S rate = S(1.0) / h, half = S(0.5) * h;
+  const S half = S(0.5) * h;
   stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
@@ -41,7 +44,7 @@ void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constan
         const Wrench<B> F = carried(gather<Displacement>(bodies, displacement, i), gather<Wrench>(bodies, impulse, i));
         const auto screw = gather<Screw>(bodies, constants.screw, i);
         const B now = screw.r * F.n.z + screw.t * F.f.z;
-        scatter_row(bodies, momentum, i + shift, as<B>(rate) * (now - gather_row(bodies, residual, i + shift)) +
+        scatter_row(bodies, momentum, i + shift, (now - gather_row(bodies, residual, i + shift)) / as<B>(h) +
                                                 as<B>(half) * gather_row(bodies, force, i + shift));
       });
     } else {
@@ -49,7 +52,7 @@ void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constan
         const Index row = tree.first_v(i);
         const auto D = load<Displacement, S>(displacement, i);
         const Wrench<S> now = carried(D, load<Wrench, S>(impulse, i)), left = carried(D, load_joint(joint, residual, row));
-        store_joint(joint, momentum, row, rate * (now - left) + half * load_joint(joint, force, row));
+        store_joint(joint, momentum, row, (now - left) / h + half * load_joint(joint, force, row));
       }
     }
   });

@@ -33,6 +33,7 @@ struct Vec3 {
   LINDEN_INLINE friend Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
   LINDEN_INLINE friend Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
   LINDEN_INLINE friend Vec3 operator*(const S& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
+  LINDEN_INLINE friend Vec3 operator/(const Vec3& a, const S& s) { return {a.x / s, a.y / s, a.z / s}; }
   LINDEN_INLINE Vec3& operator+=(const Vec3& b) { return *this = *this + b; }
 };
 
@@ -183,6 +184,7 @@ struct Wrench {
   LINDEN_INLINE friend Wrench operator-(const Wrench& a, const Wrench& b) { return {a.n - b.n, a.f - b.f}; }
   LINDEN_INLINE friend Wrench operator-(const Wrench& a) { return {-a.n, -a.f}; }
   LINDEN_INLINE friend Wrench operator*(const S& s, const Wrench& a) { return {s * a.n, s * a.f}; }
+  LINDEN_INLINE friend Wrench operator/(const Wrench& a, const S& s) { return {a.n / s, a.f / s}; }
 };
 
 template <class S>
