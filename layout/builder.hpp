@@ -76,7 +76,7 @@ class TreeBuilder {
   TreeBuilder& warn(std::string message);
 
   /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a shape of negative size, a
-  /// joint that moves no mass, a mimic of a joint that does not exist or is no screw.
+  /// joint that moves no mass or none that others do not move in the same way, a mimic of a joint that does not exist or is no screw.
   Model build() const;
 
  private:

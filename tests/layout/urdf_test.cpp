@@ -733,6 +733,39 @@ TEST_CASE("names of any length and kind are cut and kept on one line in messages
 TEST_CASE("a file without end is refused") {
   if (!std::filesystem::exists("/dev/zero")) return;
   REQUIRE_THROWS_WITH(load_urdf("/dev/zero"), StartsWith("/dev/zero: it is longer than ") && Contains("; expected a URDF"));
+TEST_CASE("joints that move the same in the same way, with nothing between them, are refused by name") {
+  const std::string empty = R"(<link name="b"/>)", end = link("c");
+  const auto xml = [&](const std::string& first, const std::string& second, const std::string& more = "") {
+    return robot(link("a") + empty + end + joint("j", first, "a", "b") + joint("k", second, "b", "c", more));
+  };
+  const std::string same = "test.urdf: joint \"j\" moves nothing that joints below it do not move in the same way";
+  REQUIRE_THAT(message_of(xml("continuous", "continuous")), StartsWith(same));
+  // crossed axes, and hinges side by side
+  REQUIRE_NOTHROW(parse_urdf(xml("continuous", "continuous", R"(<axis xyz="0 1 0"/>)"), "test.urdf"));
+  REQUIRE_NOTHROW(parse_urdf(xml("continuous", "continuous", R"(<origin xyz="0 0.3 0"/>)"), "test.urdf"));
+}
+
+TEST_CASE("a massless wrist that is singular at zero alone is a wrist") {
+  TreeBuilder builder("wrist");
+  const Eigen::Vector3d axes[] = {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()};
+  for (int k = 0; k < 3; ++k) {
+    LinkSpec one;
+    one.name = fmt::format("link{}", k);
+    one.joint = fmt::format("joint{}", k);
+    if (k > 0) one.parent = fmt::format("link{}", k - 1);
+    one.axis = axes[k];
+    if (k == 2) one.inertia = box_inertia(1, {0.1, 0.2, 0.3}, {0, 0, 0.1});
+    builder.add(one);
+  }
+  CHECK_NOTHROW(builder.build());
+  // a fourth axis through the same point is one too many
+  LinkSpec before;
+  before.name = "link3";
+  before.joint = "joint3";
+  before.parent = "link2";
+  before.axis = Eigen::Vector3d::UnitX();
+  before.inertia = box_inertia(1, {0.1, 0.2, 0.3}, {0, 0, 0.1});
+  CHECK_NOTHROW(TreeBuilder(builder).add(before).build());
 }
 
 TEST_CASE("a loop of many links is named in a few words") {
