@@ -1,9 +1,9 @@
 // What no engine could simulate: refused at load, in one sentence that says what is wrong and what to do.
 #include <cmath>
 
-#include "layout/input_error.hpp"
-#include "layout/urdf.hpp"
+#include "engine/scene.hpp"
 #include "engine/scene_file.hpp"
+#include "layout/input_error.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 
@@ -71,10 +71,40 @@ void no_inertia(Report& report) {
   }
 }
 
+void contradictions(Report& report) {
+  LinkSpec backwards = link("a", "", kBody);
+  backwards.limits.lower = 1;
+  backwards.limits.upper = -1;
+  LinkSpec free = link("a", "", kBody), leader = link("leader", "", kBody), follower = link("follower", "leader", kBody);
+  leader.limits = {.lower = 0, .upper = 1};
+  follower.limits = {.lower = 2, .upper = 3};
+  follower.mimic = leader.joint;
+  const Model tied = TreeBuilder("tied").add(leader).add(follower).build(), one = TreeBuilder("one").add(free).build();
+  LinkSpec heavy = link("a", "", {-1, {0.1, 0, 0}, moments(0.01, 0.01, 0.01)});
+  LinkSpec indefinite = link("a", "", {1, {0.1, 0, 0}, moments(0.01, -0.01, 0.01)});
+  Effects exchanged;
+  exchanged.limits = {{.row = 0, .lower = 1, .upper = -1}};
+  const std::string limits = "model: chain:2\neffects: {limits: {joint1: {lower: 1, upper: -1}}}\n";
+  for (const Impossible& impossible : {
+           Impossible{"a lower limit above the upper", [&] { TreeBuilder("backwards").add(backwards).build(); }, "a_joint"},
+           Impossible{"limits of a joint and of one that follows it without room for both", [&] { urdf_limits(tied); }, "leader_joint"},
+           Impossible{"limits of an effect exchanged",
+                      [&] { Simulation(one, {}, exchanged); }, "limits[0]"},
+           Impossible{"limits of a scene exchanged", [&] { Simulation(parse_scene(limits, "scene.yaml")); }, "scene.yaml:2"},
+           Impossible{"a negative mass", [&] { TreeBuilder("negative").add(heavy).build(); }, "\"a\""},
+           Impossible{"an inertia with a negative moment", [&] { TreeBuilder("indefinite").add(indefinite).build(); }, "\"a\""},
+       }) {
+    require_refused(report, impossible);
+  }
+}
+
 }  // namespace
 
 std::vector<Case> refusal_cases() {
-  return {{"no-inertia", "joints that move nothing", no_inertia, ""}};
+  return {{"no-inertia", "joints that move nothing, alone or together", no_inertia,
+           "Two hinges about one axis with nothing between them were accepted, and the first step was not finite. Articulated inertias in a generic "
+           "pose find such joints at load."},
+          {"contradictions", "limits that contradict each other, names and numbers that make no sense", contradictions, ""}};
 }
 
 }  // namespace linden
