@@ -1,13 +1,15 @@
 // bench/peer.hpp
-// What the comparison asks of an engine: to hold instances of one robot, started from linden's numbers, to step them together, and to
+// What a comparison asks of an engine: to hold instances of one robot, started from linden's numbers, to step them together, and to
 // say in linden's numbers where they are.
 //
 //   peers.cpp         checks and times all of them alike
 //   peer_linden.cpp   Simulation, Batch, FloatBatch
-//   peer_mujoco.cpp   MuJoCo, only where it is installed: knows the robot from its file, by its own reader
+//   peer_mujoco.cpp   MuJoCo, only where it is installed: knows a robot from its file, by its own reader
+//   peer_mjcf.cpp     what is made in code, written for it body by body
 //   peer_dart.cpp     DART, only where it is installed: is given the bodies of linden's model, one by one
 //
-// No engine has anything to do but gravity: no contact, limits, damping, friction, motors or sensors.
+// tests/gallery has them beside its hard cases. No engine has anything to do but gravity, springs and dampers: no contact, limits, friction,
+// motors or sensors.
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>
@@ -25,8 +27,9 @@ namespace linden {
 
 struct Robot {
   std::string name;
-  std::string file;  // URDF
+  std::string file;  // URDF; empty: made in code
   std::shared_ptr<const Model> model;
+  Effects effects{};  // springs and damping of screws alone, and only of what was made in code
 };
 
 struct Plan {
@@ -60,6 +63,9 @@ struct Contender {
   double rounding;          // relative; to this its energy must agree with linden's
   std::function<std::unique_ptr<Peer>(const Robot&, const Plan&)> make;
 };
+
+/// MJCF of a model made in code. Throws std::runtime_error for what MuJoCo has no joint for.
+std::string mjcf_of(const Robot& robot);
 
 std::vector<Contender> linden_contenders();
 std::vector<Contender> mujoco_contenders();

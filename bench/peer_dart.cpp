@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <dart/dynamics/BallJoint.hpp>
 #include <dart/dynamics/BodyNode.hpp>
 #include <dart/dynamics/FreeJoint.hpp>
 #include <dart/dynamics/PrismaticJoint.hpp>
@@ -13,6 +14,7 @@
 namespace linden {
 namespace {
 
+using dart::dynamics::BallJoint;
 using dart::dynamics::BodyNode;
 using dart::dynamics::FreeJoint;
 using dart::dynamics::PrismaticJoint;
@@ -49,12 +51,13 @@ BodyNode* add(const SkeletonPtr& skeleton, BodyNode* parent, const Model& model,
   typename Joint::Properties joint;
   joint.mName = model.names.joint[static_cast<std::size_t>(slot)];
   joint.mT_ParentBodyToJoint = placement_of(model, slot);
-  if constexpr (!std::is_same_v<Joint, FreeJoint>) joint.mAxis = Vector3d::UnitZ();
+  if constexpr (std::is_same_v<Joint, RevoluteJoint> || std::is_same_v<Joint, PrismaticJoint>) joint.mAxis = Vector3d::UnitZ();
   const BodyNode::AspectProperties body(model.names.body[static_cast<std::size_t>(slot)], inertia_of(model, slot));
   return skeleton->createJointAndBodyNodePair<Joint>(parent, joint, BodyNode::Properties(body)).second;
 }
 
-SkeletonPtr skeleton_of(const Model& model) {
+SkeletonPtr skeleton_of(const Robot& robot) {
+  const Model& model = *robot.model;
   const SkeletonPtr skeleton = dart::dynamics::Skeleton::create(model.names.model);
   std::vector<BodyNode*> body(static_cast<std::size_t>(model.tree.shape.slots), nullptr);
   for (Index slot = 1; slot < model.tree.shape.slots; ++slot) {
@@ -63,12 +66,22 @@ SkeletonPtr skeleton_of(const Model& model) {
     const double turn = model.constants.screw(slot, 0), shift = model.constants.screw(slot, 1);
     if (model.tree.kind(slot) == JointKind::free) {
       made = add<FreeJoint>(skeleton, parent, model, slot);
+    } else if (model.tree.kind(slot) == JointKind::ball) {
+      made = add<BallJoint>(skeleton, parent, model, slot);
     } else if (turn == 1 && shift == 0) {
       made = add<RevoluteJoint>(skeleton, parent, model, slot);
     } else if (turn == 0 && shift == 1) {
       made = add<PrismaticJoint>(skeleton, parent, model, slot);
     } else {
-      throw std::runtime_error("DART is compared on hinges, slides and free joints only");
+      throw std::runtime_error("DART is compared on hinges, slides, ball and free joints only");
+    }
+    for (const JointSpring& spring : robot.effects.springs) {
+      if (spring.row != model.tree.first_v(slot)) continue;
+      made->getParentJoint()->setSpringStiffness(0, spring.stiffness);
+      made->getParentJoint()->setRestPosition(0, spring.rest);
+    }
+    for (const JointDamping& damper : robot.effects.damping) {
+      if (damper.row == model.tree.first_v(slot)) made->getParentJoint()->setDampingCoefficient(0, damper.coefficient);
     }
   }
   return skeleton;
@@ -76,8 +89,8 @@ SkeletonPtr skeleton_of(const Model& model) {
 
 class DartPeer : public Peer {
  public:
-  DartPeer(const Robot& robot, const Plan& plan) : model_(robot.model), team_(plan.threads) {
-    const SkeletonPtr skeleton = skeleton_of(*model_);
+  DartPeer(const Robot& robot, const Plan& plan) : model_(robot.model), springs_(robot.effects.springs), team_(plan.threads) {
+    const SkeletonPtr skeleton = skeleton_of(robot);
     const auto world = dart::simulation::World::create();
     world->setTimeStep(plan.step);
     world->setGravity({0, 0, -plan.gravity});
@@ -102,6 +115,10 @@ class DartPeer : public Peer {
         pose.translation() = Eigen::Map<const Vector3d>(q);
         joint->setPositions(FreeJoint::convertToPositions(pose));
         joint->setVelocities(Eigen::Map<const Vector6d>(v));
+      } else if (model_->tree.kind(slot) == JointKind::ball) {
+        // rotation vector; angular velocity in the body's frame
+        joint->setPositions(BallJoint::convertToPositions(Matrix3d(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix())));
+        joint->setVelocities(Eigen::Map<const Vector3d>(v));
       } else {
         joint->setPosition(0, *q);
         joint->setVelocity(0, *v);
@@ -125,6 +142,8 @@ class DartPeer : public Peer {
         const Isometry3d pose = FreeJoint::convertToTransform(joint->getPositions());
         Eigen::Map<Vector3d>(q, 3) = pose.translation();
         Eigen::Map<Eigen::Vector4d>(q + 3, 4) = Eigen::Quaterniond(pose.linear()).coeffs();
+      } else if (model_->tree.kind(slot) == JointKind::ball) {
+        Eigen::Map<Eigen::Vector4d>(q, 4) = Eigen::Quaterniond(BallJoint::convertToRotation(joint->getPositions())).coeffs();
       } else {
         *q = joint->getPosition(0);
       }
@@ -135,8 +154,15 @@ class DartPeer : public Peer {
   Energy energy(std::int64_t i) override {
     // computePotentialEnergy takes the origins of bodies for their centres of mass
     const SkeletonPtr skeleton = skeleton_at(i);
-    return {.kinetic = skeleton->computeKineticEnergy(),
-            .potential = -skeleton->getMass() * skeleton->getGravity().dot(skeleton->getCOM())};
+    double potential = -skeleton->getMass() * skeleton->getGravity().dot(skeleton->getCOM());
+    for (const JointSpring& spring : springs_) {
+      for (Index slot = 1; slot < model_->tree.shape.slots; ++slot) {
+        if (model_->tree.first_v(slot) != spring.row) continue;
+        const double stretch = joint_at(skeleton, slot)->getPosition(0) - spring.rest;
+        potential += 0.5 * spring.stiffness * stretch * stretch;
+      }
+    }
+    return {.kinetic = skeleton->computeKineticEnergy(), .potential = potential};
   }
 
  private:
@@ -148,6 +174,7 @@ class DartPeer : public Peer {
   std::size_t first_q(Index slot) const { return static_cast<std::size_t>(model_->tree.first_q(slot)); }
 
   std::shared_ptr<const Model> model_;
+  std::vector<JointSpring> springs_;
   Team team_;
   std::vector<dart::simulation::WorldPtr> worlds_;
 };

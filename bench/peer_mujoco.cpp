@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include "bench/peer.hpp"
@@ -72,15 +73,22 @@ void write_for_mujoco(const Robot& robot, const std::string& target) {
 }
 
 ModelPointer load(const Robot& robot, const Plan& plan, mjtIntegrator integrator) {
-  const std::filesystem::path file = std::filesystem::temp_directory_path() / fmt::format("linden-peer-{}.urdf", getpid());
-  write_for_mujoco(robot, file.string());
+  const char* const ending = robot.file.empty() ? "xml" : "urdf";
+  const std::filesystem::path file = std::filesystem::temp_directory_path() / fmt::format("linden-peer-{}.{}", getpid(), ending);
+  if (robot.file.empty()) {
+    std::ofstream(file) << mjcf_of(robot);
+  } else {
+    write_for_mujoco(robot, file.string());
+  }
   char message[1000] = "";
   ModelPointer model(mj_loadXML(file.c_str(), nullptr, message, sizeof message));
   std::filesystem::remove(file);
-  if (!model) throw std::runtime_error(fmt::format("MuJoCo cannot read {}: {}", robot.file, message));
+  if (!model) throw std::runtime_error(fmt::format("MuJoCo cannot read {}: {}", robot.name, message));
   model->opt.timestep = plan.step;
   model->opt.integrator = integrator;
   model->opt.gravity[2] = -plan.gravity;
+  mju_user_warning = [](const char*) {};  // they are counted; it would write a file of them
+  mju_user_error = [](const char* text) { throw std::runtime_error(text); };  // it would end the program
   model->opt.disableflags |= mjDSBL_CONSTRAINT | mjDSBL_CONTACT | mjDSBL_LIMIT | mjDSBL_FRICTIONLOSS;
   return model;
 }
@@ -105,7 +113,10 @@ class MujocoPeer : public Peer {
       const double* from_v = &start.velocities[place.linden_v];
       mjtNum* q = data.qpos + place.q;
       mjtNum* v = data.qvel + place.v;
-      if (place.free) {
+      if (place.kind == JointKind::ball) {
+        for (int k = 0; k < 4; ++k) q[k] = from_q[(k + 3) % 4];
+        mju_copy3(v, from_v);
+      } else if (place.kind == JointKind::free) {
         // position, quaternion w x y z; linear velocity in the world's frame, angular in the body's
         const mjtNum quaternion[4] = {from_q[6], from_q[3], from_q[4], from_q[5]};
         mju_copy3(q, from_q);
@@ -123,6 +134,12 @@ class MujocoPeer : public Peer {
     team_.share(data_.size(), [&](std::size_t i) {
       for (int k = 0; k < n; ++k) mj_step(model_.get(), data_[i].get());
     });
+    // what is no number any more it warns of, and begins anew without a word
+    for (const DataPointer& data : data_) {
+      for (const mjtWarning bad : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
+        if (data->warning[bad].number > 0) throw std::runtime_error(mju_warningText(bad, static_cast<size_t>(data->warning[bad].lastinfo)));
+      }
+    }
   }
 
   std::vector<double> positions(std::int64_t i) override {
@@ -131,8 +148,12 @@ class MujocoPeer : public Peer {
     for (const Place& place : places_) {
       double* to = &rows[place.linden_q];
       const mjtNum* from = q + place.q;
+      if (place.kind == JointKind::ball) {
+        for (int k = 0; k < 4; ++k) to[k] = from[(k + 1) % 4];
+        continue;
+      }
       *to = *from;
-      if (!place.free) continue;
+      if (place.kind != JointKind::free) continue;
       for (int k = 1; k < 3; ++k) to[k] = from[k];
       for (int k = 0; k < 4; ++k) to[3 + k] = from[3 + (k + 1) % 4];
     }
@@ -150,7 +171,7 @@ class MujocoPeer : public Peer {
  private:
   /// First rows of one joint, ours and theirs.
   struct Place {
-    bool free;
+    JointKind kind;
     std::size_t linden_q, linden_v;
     int q, v;
   };
@@ -159,11 +180,12 @@ class MujocoPeer : public Peer {
     const Tree& tree = linden_->tree;
     const std::string& name = linden_->names.joint[static_cast<std::size_t>(slot)];
     const int joint = mj_name2id(model_.get(), mjOBJ_JOINT, name.c_str());
-    const bool free = tree.kind(slot) == JointKind::free;
-    if (joint < 0 || tree.kind(slot) == JointKind::ball || free != (model_->jnt_type[joint] == mjJNT_FREE)) {
+    const JointKind kind = tree.kind(slot);
+    const int type = joint < 0 ? -1 : model_->jnt_type[joint];
+    if (joint < 0 || (kind == JointKind::ball) != (type == mjJNT_BALL) || (kind == JointKind::free) != (type == mjJNT_FREE)) {
       throw std::runtime_error(fmt::format("MuJoCo has no joint \"{}\" of the same kind", name));
     }
-    return {free, static_cast<std::size_t>(tree.first_q(slot)), static_cast<std::size_t>(tree.first_v(slot)),
+    return {kind, static_cast<std::size_t>(tree.first_q(slot)), static_cast<std::size_t>(tree.first_v(slot)),
             model_->jnt_qposadr[joint], model_->jnt_dofadr[joint]};
   }
 
@@ -182,7 +204,8 @@ Contender contender(const char* name, const char* method, mjtIntegrator integrat
 }  // namespace
 
 std::vector<Contender> mujoco_contenders() {
-  return {contender("mujoco-euler", "semi-implicit Euler", mjINT_EULER), contender("mujoco-rk4", "Runge-Kutta of fourth order", mjINT_RK4)};
+  return {contender("mujoco-euler", "semi-implicit Euler", mjINT_EULER), contender("mujoco-rk4", "Runge-Kutta of fourth order", mjINT_RK4),
+          contender("mujoco-implicit", "Euler implicit in velocities", mjINT_IMPLICIT)};
 }
 
 }  // namespace linden

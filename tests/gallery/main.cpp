@@ -66,13 +66,17 @@ int run_gallery(int argc, char** argv) {
   }
 
   const std::vector<Case> cases = all_cases();
+  // a whole name stands for itself, another for all that begin so
+  const auto named = [&](const Case& one, const std::string& name) {
+    return std::ranges::find(cases, name, &Case::name) != cases.end() ? one.name == name : one.name.starts_with(name);
+  };
   for (const std::string& name : names) {
-    if (std::ranges::none_of(cases, [&](const Case& one) { return one.name.starts_with(name); })) {
+    if (std::ranges::none_of(cases, [&](const Case& one) { return named(one, name); })) {
       throw InputError(fmt::format("--case \"{}\": no case begins so; linden_gallery --list names them", name));
     }
   }
   const auto chosen = [&](const Case& one) {
-    return names.empty() || std::ranges::any_of(names, [&](const std::string& name) { return one.name.starts_with(name); });
+    return names.empty() || std::ranges::any_of(names, [&](const std::string& name) { return named(one, name); });
   };
   const Form form = full ? Form::full : quick ? Form::quick : Form::brief;
   std::vector<Shown> gallery;
