@@ -10,13 +10,28 @@
 namespace linden {
 namespace {
 
-void from_horizontal(Report& report, Index links, std::int64_t steps, int every) {
+RunRecord from_horizontal(Report& report, Index links, std::int64_t steps, int every) {
   Scenario falling = scenario(chain(links), {.step = 1e-3}, steps);
   falling.every = every;
   const RunRecord record = run(falling);
-  promise_conservation(report, record, steps, steps >= 20'000);
-  report.note(fmt::format("{} steps", steps));
+  promise_conservation(report, record, steps, false);
+  report.note(fmt::format("{} steps, turns of up to {:.2g} rad a step", steps, record.turn));
   run_beside(report, falling, record.drift.scale());
+  return record;
+}
+
+/// At 1 ms a crack takes a step or two, and each crack moves the energy a little, up or down, within the band: there a slope is that of a
+/// random walk. At half the step cracks are resolved. What the first tenth of the run does to the energy, as the order of the
+/// start turns into chaos, is no slope either.
+void fifty_links(Report& report) {
+  from_horizontal(report, 50, report.pick(1000, 20'000, 200'000), report.pick(1, 2, 10));
+  if (report.form() == Form::quick) return;
+  const auto steps = report.pick<std::int64_t>(0, 60'000, 600'000);
+  Simulation simulation(chain(50), {.step = 5e-4});
+  const RunRecord first = run(simulation, steps / 10, 10), rest = run(simulation, steps, 10);
+  report.at_most("at 0.5 ms: steps that failed", static_cast<double>(steps / 10 - first.steps + steps - rest.steps), 0, "every step has a solution");
+  report.at_most("at 0.5 ms: |slope of energy| / its standard error", std::abs(rest.drift.slope()) / rest.drift.slope_error(), 5,
+                 "no slope: one run in 10,000 without any lies beyond");
 }
 
 /// Planar links of `length` and `mass(i)`, hinges about y; the first hangs from the world's origin along its x axis.
@@ -116,7 +131,7 @@ std::vector<Case> chain_cases() {
   const std::string swinging = "swings from horizontal, h = 1 ms: ";
   return {
       {"chain-50", swinging + "a wave runs down and the end cracks like a whip",
-       [](Report& report) { from_horizontal(report, 50, report.pick(1000, 20'000, 200'000), report.pick(1, 2, 10)); }, ""},
+       fifty_links, ""},
       {"chain-100", swinging + "the crack of a longer one, at the end of more joints",
        [](Report& report) { from_horizontal(report, 100, report.pick(500, 2000, 100'000), report.pick(1, 1, 10)); }, ""},
       {"chain-1000", swinging + "sums over 1,000 joints",
