@@ -23,7 +23,6 @@ void long_chain(Report& report) {
   falling.every = report.pick(1, 1, 5);
   const RunRecord record = run(falling);
   promise_conservation(report, record, steps, true);
-  report.note(fmt::format("{} steps; slope {:.1e} of the largest kinetic energy a second", steps, record.drift.slope() / record.drift.scale()));
   run_beside(report, falling, record.drift.scale());
 }
 
@@ -46,7 +45,6 @@ void long_humanoid(Report& report) {
   const double walk = static_cast<double>(tumbling.model->tree.bodies()) * kEpsilon * std::sqrt(static_cast<double>(steps));
   report.at_most("drift of linear momentum, relative", record.momentum->linear(), walk, "an epsilon a body and step, as a random walk");
   report.at_most("drift of angular momentum, relative", in_place.momentum->angular(), walk, "the same, of a run in place");
-  report.note(fmt::format("{} steps; slope {:.1e} of the largest kinetic energy a second", steps, record.drift.slope() / record.drift.scale()));
 }
 
 }  // namespace
