@@ -8,6 +8,9 @@
 namespace linden {
 namespace {
 
+/// Elements within each other, above which MuJoCo's reader of XML stops.
+constexpr Index kMostNested = 100;
+
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -65,6 +68,7 @@ std::string begin_of(const Robot& robot, Index slot) {
 
 std::string mjcf_of(const Robot& robot) {
   const Tree& tree = robot.model->tree;
+  if (tree.levels() + 3 > kMostNested) throw std::runtime_error("MuJoCo reads no file nested deeper than 100 elements");
   std::vector<std::vector<Index>> children(static_cast<std::size_t>(tree.shape.slots));
   for (Index slot = 1; slot < tree.shape.slots; ++slot) children[static_cast<std::size_t>(tree.parent(slot))].push_back(slot);
   std::string text = "<mujoco><compiler angle=\"radian\" inertiafromgeom=\"false\" boundmass=\"0\" boundinertia=\"0\" balanceinertia=\"false\"/>"

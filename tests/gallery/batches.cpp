@@ -77,7 +77,7 @@ Rolled roll(const std::vector<std::size_t>& order, int threads, std::int64_t ste
 }
 
 void one_block(Report& report) {
-  const auto steps = report.pick<std::int64_t>(100, 2000, 20'000);
+  const auto steps = report.pick<std::int64_t>(100, 1000, 5000);
   std::vector<std::size_t> all(instances().size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   const Rolled whole = roll(all, 1, steps, steps);

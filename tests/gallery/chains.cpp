@@ -133,7 +133,10 @@ std::vector<Case> chain_cases() {
       {"chain-100", swinging + "the crack of a longer one, at the end of more joints",
        [](Report& report) { from_horizontal(report, 100, report.pick(500, 2000, 100'000), report.pick(1, 1, 10)); }, ""},
       {"chain-1000", swinging + "sums over 1,000 joints",
-       [](Report& report) { from_horizontal(report, 1000, report.pick(20, 300, 20'000), report.pick(1, 1, 10)); }, ""},
+       [](Report& report) { from_horizontal(report, 1000, report.pick(20, 300, 13'000), report.pick(1, 1, 10)); },
+       "At 1 ms until the end cracks for the second time, 13.9 s after the start: there the last link turns at 4,000 rad/s, and steps are split, then "
+       "refused. The first crack, at 4.5 s and 300 rad/s, passes. Longer chains crack faster still: 0.2 ms gets through the second with 1 % of "
+       "the energy."},
       {"chain-10000", swinging + "the tension of a kilometre of chain in every joint",
        [](Report& report) { from_horizontal(report, 10'000, report.pick(3, 50, 2000), report.pick(1, 5, 10)); }, ""},
       {"chain-100000", swinging + "rounding of sums over 10 km",

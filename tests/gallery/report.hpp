@@ -72,7 +72,7 @@ struct Case {
   std::string name;
   std::string hard;    // what is hard, in the words of those whom it troubles
   std::function<void(Report&)> measure;
-  std::string remedy;  // what was wrong when it first failed and what made it right; empty where nothing was
+  std::string story;  // what was wrong when it first failed and what made it right, or where nature sets the limit; empty: it never failed
 };
 
 /// The families, each in a file of its own.

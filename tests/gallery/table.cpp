@@ -47,6 +47,7 @@ std::string text_of(const Shown& shown) {
   }
   for (const std::string& note : report.notes()) text += fmt::format("         {}\n", note);
   for (const Besides& other : report.besides()) text += fmt::format("         {}: {}\n", other.engine, other.found);
+  if (!shown.shown->story.empty()) text += fmt::format("         {}\n", shown.shown->story);
   return text;
 }
 
@@ -72,6 +73,10 @@ std::string markdown_of(const std::vector<Shown>& gallery) {
       text += fmt::format(" {} |", found == besides.end() ? "" : cell(found->found));
     }
     text += '\n';
+  }
+  text += '\n';
+  for (const Shown& shown : gallery) {
+    if (!shown.shown->story.empty()) text += fmt::format("- `{}`: {}\n", shown.shown->name, shown.shown->story);
   }
   return text;
 }
