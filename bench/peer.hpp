@@ -59,7 +59,7 @@ class Peer {
 struct Contender {
   std::string name;         // "mujoco-rk4"
   std::string description;  // "MuJoCo 2.2.2, classical Runge-Kutta"
-  bool alone, many;         // whether it steps one instance, whether it steps many
+  bool alone, many;         // whether it is timed with one instance, whether with many
   double rounding;          // relative; to this its energy must agree with linden's
   std::function<std::unique_ptr<Peer>(const Robot&, const Plan&)> make;
 };

@@ -72,7 +72,7 @@ std::string mjcf_of(const Robot& robot) {
   std::vector<std::vector<Index>> children(static_cast<std::size_t>(tree.shape.slots));
   for (Index slot = 1; slot < tree.shape.slots; ++slot) children[static_cast<std::size_t>(tree.parent(slot))].push_back(slot);
   std::string text = "<mujoco><compiler angle=\"radian\" inertiafromgeom=\"false\" boundmass=\"0\" boundinertia=\"0\" balanceinertia=\"false\"/>"
-                     "<size njmax=\"0\" nconmax=\"0\"/><worldbody>";
+                     "<size njmax=\"0\" nconmax=\"0\" nstack=\"1000000\"/><worldbody>";
   // without recursion: a chain is as deep as it is long; a negative slot closes its body
   std::vector<Index> waiting(children[0].rbegin(), children[0].rend());
   while (!waiting.empty()) {
