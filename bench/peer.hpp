@@ -1,6 +1,6 @@
 // bench/peer.hpp
-// What a comparison asks of an engine: to hold instances of one robot, started from linden's numbers, to step them together, and to
-// say in linden's numbers where they are.
+// What a comparison asks of an engine: to hold instances of one robot, started from linden's numbers, to step them together, and
+// to say in linden's numbers where they are.
 //
 //   peers.cpp         checks and times all of them alike
 //   peer_linden.cpp   Simulation, Batch, FloatBatch
@@ -8,8 +8,8 @@
 //   peer_mjcf.cpp     what is made in code, written for it body by body
 //   peer_dart.cpp     DART, only where it is installed: is given the bodies of linden's model, one by one
 //
-// tests/gallery has them beside its hard cases. No engine has anything to do but gravity, springs and dampers: no contact, limits, friction,
-// motors or sensors.
+// tests/gallery has them beside its hard cases. No engine has anything to do but gravity, springs and dampers: no contact,
+// limits, friction, motors or sensors.
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>

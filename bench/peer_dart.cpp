@@ -117,7 +117,8 @@ class DartPeer : public Peer {
         joint->setVelocities(Eigen::Map<const Vector6d>(v));
       } else if (model_->tree.kind(slot) == JointKind::ball) {
         // rotation vector; angular velocity in the body's frame
-        joint->setPositions(BallJoint::convertToPositions(Matrix3d(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix())));
+        joint->setPositions(
+            BallJoint::convertToPositions(Matrix3d(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix())));
         joint->setVelocities(Eigen::Map<const Vector3d>(v));
       } else {
         joint->setPosition(0, *q);

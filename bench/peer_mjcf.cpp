@@ -39,8 +39,9 @@ std::string joint_of(const Robot& robot, Index slot) {
   for (const JointDamping& damper : robot.effects.damping) {
     if (damper.row == model.tree.first_v(slot)) damping = damper.coefficient;
   }
-  return fmt::format("<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" stiffness=\"{:.17g}\" springref=\"{:.17g}\" damping=\"{:.17g}\"/>", name,
-                     turn == 1 ? "hinge" : "slide", stiffness, rest, damping);
+  return fmt::format(
+      "<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" stiffness=\"{:.17g}\" springref=\"{:.17g}\" damping=\"{:.17g}\"/>", name,
+      turn == 1 ? "hinge" : "slide", stiffness, rest, damping);
 }
 
 std::string inertial_of(const Model& model, Index slot) {
@@ -50,7 +51,8 @@ std::string inertial_of(const Model& model, Index slot) {
   Matrix3d about;
   about << number[4], number[5], number[6], number[5], number[7], number[8], number[6], number[8], number[9];
   about -= mass * (center.squaredNorm() * Matrix3d::Identity() - center * center.transpose());
-  return fmt::format("<inertial mass=\"{:.17g}\" pos=\"{}\" fullinertia=\"{}\"/>", mass, numbers({center.x(), center.y(), center.z()}),
+  return fmt::format("<inertial mass=\"{:.17g}\" pos=\"{}\" fullinertia=\"{}\"/>", mass,
+                     numbers({center.x(), center.y(), center.z()}),
                      numbers({about(0, 0), about(1, 1), about(2, 2), about(0, 1), about(0, 2), about(1, 2)}));
 }
 
@@ -71,8 +73,9 @@ std::string mjcf_of(const Robot& robot) {
   if (tree.levels() + 3 > kMostNested) throw std::runtime_error("MuJoCo reads no file nested deeper than 100 elements");
   std::vector<std::vector<Index>> children(static_cast<std::size_t>(tree.shape.slots));
   for (Index slot = 1; slot < tree.shape.slots; ++slot) children[static_cast<std::size_t>(tree.parent(slot))].push_back(slot);
-  std::string text = "<mujoco><compiler angle=\"radian\" inertiafromgeom=\"false\" boundmass=\"0\" boundinertia=\"0\" balanceinertia=\"false\"/>"
-                     "<size njmax=\"0\" nconmax=\"0\" nstack=\"1000000\"/><worldbody>";
+  std::string text =
+      "<mujoco><compiler angle=\"radian\" inertiafromgeom=\"false\" boundmass=\"0\" boundinertia=\"0\" balanceinertia=\"false\"/>"
+      "<size njmax=\"0\" nconmax=\"0\" nstack=\"1000000\"/><worldbody>";
   // without recursion: a chain is as deep as it is long; a negative slot closes its body
   std::vector<Index> waiting(children[0].rbegin(), children[0].rend());
   while (!waiting.empty()) {

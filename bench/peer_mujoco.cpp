@@ -87,7 +87,7 @@ ModelPointer load(const Robot& robot, const Plan& plan, mjtIntegrator integrator
   model->opt.timestep = plan.step;
   model->opt.integrator = integrator;
   model->opt.gravity[2] = -plan.gravity;
-  mju_user_warning = [](const char*) {};  // they are counted; it would write a file of them
+  mju_user_warning = [](const char*) {};                                      // they are counted; it would write a file of them
   mju_user_error = [](const char* text) { throw std::runtime_error(text); };  // it would end the program
   model->opt.disableflags |= mjDSBL_CONSTRAINT | mjDSBL_CONTACT | mjDSBL_LIMIT | mjDSBL_FRICTIONLOSS;
   return model;
@@ -137,7 +137,8 @@ class MujocoPeer : public Peer {
     // what is no number any more it warns of, and begins anew without a word
     for (const DataPointer& data : data_) {
       for (const mjtWarning bad : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
-        if (data->warning[bad].number > 0) throw std::runtime_error(mju_warningText(bad, static_cast<size_t>(data->warning[bad].lastinfo)));
+        if (data->warning[bad].number > 0)
+          throw std::runtime_error(mju_warningText(bad, static_cast<size_t>(data->warning[bad].lastinfo)));
       }
     }
   }
@@ -197,15 +198,18 @@ class MujocoPeer : public Peer {
 };
 
 Contender contender(const char* name, const char* method, mjtIntegrator integrator, bool races = true) {
-  return {name, fmt::format("MuJoCo {}, {}", mj_versionString(), method), races, races, 1e-7,
-          [=](const Robot& robot, const Plan& plan) { return std::make_unique<MujocoPeer>(robot, plan, integrator); }};
+  return {name,  fmt::format("MuJoCo {}, {}", mj_versionString(), method),
+          races, races,
+          1e-7,  [=](const Robot& robot, const Plan& plan) { return std::make_unique<MujocoPeer>(robot, plan, integrator); }};
 }
 
 }  // namespace
 
 std::vector<Contender> mujoco_contenders() {
-  return {contender("mujoco-euler", "semi-implicit Euler", mjINT_EULER), contender("mujoco-rk4", "Runge-Kutta of fourth order", mjINT_RK4),
-          contender("mujoco-implicit", "Euler implicit in velocities", mjINT_IMPLICIT, false)};  // needs more stack than robots' files give
+  return {contender("mujoco-euler", "semi-implicit Euler", mjINT_EULER),
+          contender("mujoco-rk4", "Runge-Kutta of fourth order", mjINT_RK4),
+          contender("mujoco-implicit", "Euler implicit in velocities", mjINT_IMPLICIT,
+                    false)};  // needs more stack than robots' files give
 }
 
 }  // namespace linden

@@ -27,8 +27,8 @@ constexpr double kTriangleSlack = 1e-9;
 /// A joint is taken to move nothing when the inertia it feels is below this share of what its subtree could have.
 constexpr double kMovesNothing = 1e-14;
 
-/// And to move only what other joints can move in the same way when, those yielding, it feels less than this share of what it feels while they
-/// are held. Light bodies between heavy ones come to 1e-12, rounding to 1e-15.
+/// And to move only what other joints can move in the same way when, those yielding, it feels less than this share of what it
+/// feels while they are held. Light bodies between heavy ones come to 1e-12, rounding to 1e-15.
 constexpr double kMovesNothingOfItsOwn = 1e-13;
 
 /// A moving body before sorting: parents are indices into the same list, -1 the world.
@@ -435,7 +435,8 @@ class Build {
     return screw;
   }
 
-  /// Placement in the parent with the joint moved by an amount that no two joints of a model share and that no robot is built for.
+  /// Placement in the parent with the joint moved by an amount that no two joints of a model share and that no robot is built
+  /// for.
   static Isometry3d placement_in_generic_pose(const Body& body, Index slot) {
     const double amount = 0.7 + 0.13 * static_cast<double>(slot % 7) + 0.29 * static_cast<double>(slot % 5);
     Isometry3d pose = body.placement;
@@ -458,13 +459,14 @@ class Build {
   }
 
   static double least_eigenvalue(const Eigen::MatrixXd& matrix) {
-    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (matrix + matrix.transpose()), Eigen::EigenvaluesOnly).eigenvalues()[0];
+    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (matrix + matrix.transpose()), Eigen::EigenvaluesOnly)
+        .eigenvalues()[0];
   }
 
-  /// No motion of the joints may leave all mass at rest, as that of two hinges about one axis with nothing between them: seen from the root,
-  /// each joint must feel inertia while all those below it yield (articulated inertia: Featherstone, Rigid Body Dynamics Algorithms, 7.2). In
-  /// a generic pose, since many a wrist can do so in its zero pose and in no other. Where every body has an inertia of its own
-  /// there is nothing to look for.
+  /// No motion of the joints may leave all mass at rest, as that of two hinges about one axis with nothing between them: seen
+  /// from the root, each joint must feel inertia while all those below it yield (articulated inertia: Featherstone, Rigid Body
+  /// Dynamics Algorithms, 7.2). In a generic pose, since many a wrist can do so in its zero pose and in no other. Where every
+  /// body has an inertia of its own there is nothing to look for.
   void check_independence() const {
     const Index slots = model_.tree.shape.slots;
     bool all_of_their_own = true;
@@ -473,7 +475,8 @@ class Build {
       all_of_their_own = least_eigenvalue(S.transpose() * spatial(in_slot(i).inertia) * S) > 0;
     }
     if (all_of_their_own) return;
-    std::vector<Matrix6d, Eigen::aligned_allocator<Matrix6d>> yielding(static_cast<std::size_t>(slots), Matrix6d::Zero()), held = yielding;
+    std::vector<Matrix6d, Eigen::aligned_allocator<Matrix6d>> yielding(static_cast<std::size_t>(slots), Matrix6d::Zero()),
+        held = yielding;
     for (Index i = slots - 1; i > 0; --i) {
       const Body& body = in_slot(i);
       const auto at = static_cast<std::size_t>(i);
@@ -481,9 +484,10 @@ class Build {
       const Matrix6d own = spatial(body.inertia), A = yielding[at] + own, whole = held[at] + own;
       const Eigen::MatrixXd d = S.transpose() * A * S;
       if (!(least_eigenvalue(d) > kMovesNothingOfItsOwn * (S.transpose() * whole * S).trace())) {
-        fail(fmt::format("joint \"{}\" moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
-                         "joints that each move something of their own; give link \"{}\" an inertia, or fix one of the joints",
-                         body.joint, body.link));
+        fail(fmt::format(
+            "joint \"{}\" moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
+            "joints that each move something of their own; give link \"{}\" an inertia, or fix one of the joints",
+            body.joint, body.link));
       }
       if (body.parent < 0) continue;
       const Matrix6d left = A - A * S * d.ldlt().solve(Eigen::MatrixXd(S.transpose() * A));

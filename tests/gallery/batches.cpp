@@ -69,7 +69,8 @@ Rolled roll(const std::vector<std::size_t>& order, int threads, std::int64_t ste
     const Eigen::VectorXd q = batch.positions().instance(at), p = batch.momenta().instance(at);
     std::string bytes(static_cast<std::size_t>(q.size() + p.size()) * sizeof(double), '\0');
     std::memcpy(bytes.data(), q.data(), static_cast<std::size_t>(q.size()) * sizeof(double));
-    std::memcpy(bytes.data() + static_cast<std::size_t>(q.size()) * sizeof(double), p.data(), static_cast<std::size_t>(p.size()) * sizeof(double));
+    std::memcpy(bytes.data() + static_cast<std::size_t>(q.size()) * sizeof(double), p.data(),
+                static_cast<std::size_t>(p.size()) * sizeof(double));
     rolled.ends.push_back(bytes);
     rolled.failures.push_back(batch.describe(at));
   }
@@ -96,9 +97,11 @@ void one_block(Report& report) {
     for (int k = 0; k < 23; ++k) order.push_back(random.below(3) == 0 ? 7 : random.below(all.size()));
     compare(order, roll(order, 1 + round % 2, steps, round < 2 ? steps : 17));
   }
-  report.at_most("instances whose bits depend on company, threads or calls", disturbed, 0, "a lane knows nothing of its neighbours");
+  report.at_most("instances whose bits depend on company, threads or calls", disturbed, 0,
+                 "a lane knows nothing of its neighbours");
   const bool one_failed = !whole.failures[7].empty();
-  report.at_least("the instance that cannot be stepped is frozen and named", one_failed ? 1 : 0, 1, "10,000 rad a step have no solution, even split");
+  report.at_least("the instance that cannot be stepped is frozen and named", one_failed ? 1 : 0, 1,
+                  "10,000 rad a step have no solution, even split");
   int others = 0;
   for (const std::size_t i : all) others += i != 7 && !whole.failures[i].empty();
   for (const std::size_t i : all) {
@@ -110,7 +113,8 @@ void one_block(Report& report) {
 }  // namespace
 
 std::vector<Case> batch_cases() {
-  return {{"one-block", "instances from dust to cranes, slow and whirling, one of them impossible, in one block of lanes", one_block, ""}};
+  return {{"one-block", "instances from dust to cranes, slow and whirling, one of them impossible, in one block of lanes",
+           one_block, ""}};
 }
 
 }  // namespace linden

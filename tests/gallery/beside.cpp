@@ -64,7 +64,8 @@ std::string found_by(const Contender& contender, const Scenario& scenario, doubl
     if (!(now < kBlownUp)) return fmt::format("blown up at {:.3g} s", static_cast<double>(k + scenario.every) * h);
     off = std::max(off, now);
   }
-  return steps < scenario.steps ? fmt::format("{:.1e} in {:.3g} s", off, static_cast<double>(steps) * h) : fmt::format("{:.1e}", off);
+  return steps < scenario.steps ? fmt::format("{:.1e} in {:.3g} s", off, static_cast<double>(steps) * h)
+                                : fmt::format("{:.1e}", off);
 }
 
 /// What `find` says, in a process of its own: an engine whose assertions fail ends that one, and what it prints nobody sees.

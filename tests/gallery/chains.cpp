@@ -20,15 +20,16 @@ RunRecord from_horizontal(Report& report, Index links, std::int64_t steps, int e
   return record;
 }
 
-/// At 1 ms a crack takes a step or two, and each moves the energy a little, up or down; at half the step cracks are resolved. What the first
-/// tenth of the run does to the energy, as the order of the start turns into chaos, is no slope.
+/// At 1 ms a crack takes a step or two, and each moves the energy a little, up or down; at half the step cracks are resolved.
+/// What the first tenth of the run does to the energy, as the order of the start turns into chaos, is no slope.
 void fifty_links(Report& report) {
   from_horizontal(report, 50, report.pick(1000, 20'000, 200'000), report.pick(1, 2, 10));
   if (report.form() == Form::quick) return;
   const auto steps = report.pick<std::int64_t>(0, 60'000, 600'000);
   Simulation simulation(chain(50), {.step = 5e-4});
   const RunRecord first = run(simulation, steps / 10, 10), rest = run(simulation, steps, 10);
-  report.at_most("at 0.5 ms: steps that failed", static_cast<double>(steps / 10 - first.steps + steps - rest.steps), 0, "every step has a solution");
+  report.at_most("at 0.5 ms: steps that failed", static_cast<double>(steps / 10 - first.steps + steps - rest.steps), 0,
+                 "every step has a solution");
   promise_no_slope(report, rest);
 }
 
@@ -49,8 +50,8 @@ Model planar_chain(const std::string& name, Index links, double length, const Ma
   return builder.build();
 }
 
-/// Angles of a planar chain whose first half goes along `direction` [rad, from x towards -z], whose middle link lies across, and whose second
-/// half comes back.
+/// Angles of a planar chain whose first half goes along `direction` [rad, from x towards -z], whose middle link lies across, and
+/// whose second half comes back.
 std::vector<double> folded(Index links, double direction) {
   std::vector<double> q(static_cast<std::size_t>(links), 0.0);
   q[0] = direction;
@@ -69,8 +70,9 @@ double tip_height(std::span<const double> q, double length) {
   return height;
 }
 
-/// A chain held at one end, folded in the middle, its other end let go beside the first. The half that falls pulls at the fold and is
-/// pulled by it. With the energy kept and no width at the fold the end reaches the bottom in 0.847213 of the time of a free fall:
+/// A chain held at one end, folded in the middle, its other end let go beside the first. The half that falls pulls at the fold
+/// and is pulled by it. With the energy kept and no width at the fold the end reaches the bottom in 0.847213 of the time of a
+/// free fall:
 ///
 ///   t = sqrt(L / g) integral_0^1 sqrt((1 - s) / (s (2 - s))) ds = 0.847213 sqrt(2 L / g)
 ///
@@ -102,7 +104,8 @@ void folded_chain(Report& report) {
   report.at_least("lead of the tip over a free fall [m]", lead, 0.1 * total, "Calkin, March: the end falls faster than g");
   report.at_most("|time of the fall / free fall - 0.8472|", std::abs(share - 0.847213), 2.0 / links,
                  "closed form of a chain of no width; ours is a link wide at the fold");
-  report.note(fmt::format("{} links: {:.4f} of a free fall; energy error {:.1e} of the fall", links, share, error / (g * total / 4)));
+  report.note(
+      fmt::format("{} links: {:.4f} of a free fall; energy error {:.1e} of the fall", links, share, error / (g * total / 4)));
 }
 
 /// A straight whip whose end half is thrown back along itself: the moving part gets shorter and lighter and keeps the energy.
@@ -128,14 +131,15 @@ void whip(Report& report) {
 std::vector<Case> chain_cases() {
   const std::string swinging = "swings from horizontal, h = 1 ms: ";
   return {
-      {"chain-50", swinging + "a wave runs down and the end cracks like a whip",
-       fifty_links, ""},
+      {"chain-50", swinging + "a wave runs down and the end cracks like a whip", fifty_links, ""},
       {"chain-100", swinging + "the crack of a longer one, at the end of more joints",
        [](Report& report) { from_horizontal(report, 100, report.pick(500, 2000, 100'000), report.pick(1, 1, 10)); }, ""},
       {"chain-1000", swinging + "sums over 1,000 joints",
        [](Report& report) { from_horizontal(report, 1000, report.pick(20, 300, 13'000), report.pick(1, 1, 10)); },
-       "At 1 ms until the end cracks for the second time, 13.9 s after the start: there the last link turns at 4,000 rad/s, and steps are split, then "
-       "refused. The first crack, at 4.5 s and 300 rad/s, passes. Longer chains crack faster still: 0.2 ms gets through the second with 1 % of "
+       "At 1 ms until the end cracks for the second time, 13.9 s after the start: there the last link turns at 4,000 rad/s, and "
+       "steps are split, then "
+       "refused. The first crack, at 4.5 s and 300 rad/s, passes. Longer chains crack faster still: 0.2 ms gets through the "
+       "second with 1 % of "
        "the energy."},
       {"chain-10000", swinging + "the tension of a kilometre of chain in every joint",
        [](Report& report) { from_horizontal(report, 10'000, report.pick(3, 50, 2000), report.pick(1, 5, 10)); }, ""},

@@ -1,7 +1,7 @@
 // A million steps: what is kept, and what rounding may do to it.
 //
-// A step rounds the momentum of the whole at every joint by an epsilon or so, up or down. Over N steps that is a random walk of sqrt(N) such:
-// nothing that rounds can do better without compensating, and a drift, however small a step's, would grow with N.
+// A step rounds the momentum of the whole at every joint by an epsilon or so, up or down. Over N steps that is a random walk of
+// sqrt(N) such: nothing that rounds can do better without compensating, and a drift, however small a step's, would grow with N.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -35,7 +35,8 @@ void long_humanoid(Report& report) {
   const RunRecord record = run(tumbling);
   promise_conservation(report, record, steps, report.form() != Form::quick);
   run_beside(report, tumbling, record.drift.scale());
-  // the same staying where it is: an angular momentum about an origin half a kilometre away would count an epsilon of that distance
+  // the same staying where it is: an angular momentum about an origin half a kilometre away would count an epsilon of that
+  // distance
   const Momentum momentum = simulation_of(tumbling).momentum();
   const Eigen::Quaterniond turn(Eigen::Vector4d(&tumbling.start.positions[3]));
   const double mass = mass_distribution(*tumbling.model, tumbling.start.positions).mass;
@@ -43,7 +44,8 @@ void long_humanoid(Report& report) {
   for (int k = 0; k < 3; ++k) tumbling.start.velocities[static_cast<std::size_t>(3 + k)] -= drift[k];
   const RunRecord in_place = run(tumbling);
   const double walk = static_cast<double>(tumbling.model->tree.bodies()) * kEpsilon * std::sqrt(static_cast<double>(steps));
-  report.at_most("drift of linear momentum, relative", record.momentum->linear(), walk, "an epsilon a body and step, as a random walk");
+  report.at_most("drift of linear momentum, relative", record.momentum->linear(), walk,
+                 "an epsilon a body and step, as a random walk");
   report.at_most("drift of angular momentum, relative", in_place.momentum->angular(), walk, "the same, of a run in place");
 }
 
@@ -53,7 +55,8 @@ std::vector<Case> long_cases() {
   return {
       {"long-chain", "the ten-link chain for a million steps", long_chain, ""},
       {"long-humanoid", "a humanoid afloat for a million steps", long_humanoid,
-       "Momenta grew by 2e-17 of themselves in every step, 2e-11 in a million: they were multiplied by h and then by 1 / h, whose product is not 1. They are "
+       "Momenta grew by 2e-17 of themselves in every step, 2e-11 in a million: they were multiplied by h and then by 1 / h, "
+       "whose product is not 1. They are "
        "divided by h now and walk at random to 1e-12."},
   };
 }

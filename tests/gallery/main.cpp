@@ -22,7 +22,8 @@ namespace {
 
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
-  for (const auto family : {chain_cases, mass_cases, scale_cases, step_cases, orientation_cases, published_cases, stiff_cases, long_cases, rotor_cases, batch_cases, random_cases, refusal_cases}) {
+  for (const auto family : {chain_cases, mass_cases, scale_cases, step_cases, orientation_cases, published_cases, stiff_cases,
+                            long_cases, rotor_cases, batch_cases, random_cases, refusal_cases}) {
     std::ranges::move(family(), std::back_inserter(cases));
   }
   return cases;
@@ -41,7 +42,8 @@ Shown shown(const Case& one, Form form, bool peers) {
 }
 
 int run_gallery(int argc, char** argv) {
-  CLI::App program("Runs cases that are hard for engines of rigid bodies, and holds linden to what it promises.", "linden_gallery");
+  CLI::App program("Runs cases that are hard for engines of rigid bodies, and holds linden to what it promises.",
+                   "linden_gallery");
   bool full = false, quick = false, list = false, alone = false;
   std::vector<std::string> names;
   std::string csv, markdown;

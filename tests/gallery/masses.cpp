@@ -21,17 +21,18 @@ Scenario swing(Report& report, Model model, double h, std::int64_t brief = 20'00
   return swinging;
 }
 
-/// Ten links, the first of 1 kg, each heavier than the one before by the same factor, the last by `ratio`: at a step that resolves
-/// how the light links move, and at one that does not.
+/// Ten links, the first of 1 kg, each heavier than the one before by the same factor, the last by `ratio`: at a step that
+/// resolves how the light links move, and at one that does not.
 void ratio_along_chain(Report& report, double ratio, double h, const std::string& why) {
   const Index links = 10;
   const double factor = std::pow(ratio, 1.0 / (links - 1));
-  Scenario coarse = swing(report, hinged_chain("ratio", links, 0.1, [&](Index i) { return rod(std::pow(factor, i), 0.1); }), h, 200'000);
+  Scenario coarse =
+      swing(report, hinged_chain("ratio", links, 0.1, [&](Index i) { return rod(std::pow(factor, i), 0.1); }), h, 200'000);
   coarse.options.step = 1e-3;
   coarse.steps = 20'000;
   const RunRecord unresolved = run(coarse);
-  report.at_least("at 1 ms: steps refused or split", static_cast<double>(unresolved.split + (unresolved.failure.empty() ? 0 : 1)), 1,
-                  "a motion that a step cannot resolve must not pass in silence: " + why);
+  report.at_least("at 1 ms: steps refused or split", static_cast<double>(unresolved.split + (unresolved.failure.empty() ? 0 : 1)),
+                  1, "a motion that a step cannot resolve must not pass in silence: " + why);
   if (!unresolved.failure.empty()) report.note("at 1 ms: " + unresolved.failure);
 }
 
@@ -42,7 +43,8 @@ void ratio_of_two(Report& report, double ratio) {
 
 /// Between every two links a body of no mass and no inertia, as robots' files have them at shoulders and hips.
 void massless_between(Report& report) {
-  swing(report, hinged_chain("massless between", 10, 0.1, [&](Index i) { return i % 2 == 0 ? LinkInertia{} : rod(0.1, 0.1); }), 1e-3);
+  swing(report, hinged_chain("massless between", 10, 0.1, [&](Index i) { return i % 2 == 0 ? LinkInertia{} : rod(0.1, 0.1); }),
+        1e-3);
 }
 
 /// A chain of five ball joints, links of 0.1 kg with these principal moments per kg.
@@ -72,16 +74,29 @@ std::vector<Case> mass_cases() {
        "Nothing is wrong: the motion is that fast, and the step has to follow it."},
       {"heavy-tip", "ten links, each heavier than the one before, the last by 1e9",
        [](Report& r) {
-         ratio_along_chain(r, 1e9, 1e-6, "the first links are strings that hold 1e9 times their weight and ring at sqrt(g M / m l) = 3e5 rad/s");
+         ratio_along_chain(
+             r, 1e9, 1e-6,
+             "the first links are strings that hold 1e9 times their weight and ring at sqrt(g M / m l) = 3e5 rad/s");
        },
        "Nothing is wrong: weight acts at the ends of a step, as in the leapfrog, and must be resolved, h w < 2."},
       {"light-after-heavy", "two links, 1 kg and 1e-9 kg", [](Report& r) { ratio_of_two(r, 1e-9); }, ""},
       {"heavy-after-light", "two links, 1 kg and 1e9 kg", [](Report& r) { ratio_of_two(r, 1e9); }, ""},
       {"massless-between", "every other body has no mass and no inertia", massless_between, ""},
-      {"flat-inertia", "I1 + I2 = I3: the edge of the triangle inequality", [](Report& r) { moments_of(r, {1e-4, 2e-4, 3e-4}); }, ""},
-      {"needle", "links a hundred thousand times harder to turn across than along", [](Report& r) { moments_of(r, {1e-8, 1e-3, 1e-3}); },
+      {"flat-inertia", "I1 + I2 = I3: the edge of the triangle inequality",
+       [](Report& r) {
+         moments_of(r, {1e-4, 2e-4, 3e-4});
+       },
        ""},
-      {"plate", "links as thin as paper", [](Report& r) { moments_of(r, {1e-3, 1e-8, 1e-3 + 1e-8}); }, ""},
+      {"needle", "links a hundred thousand times harder to turn across than along",
+       [](Report& r) {
+         moments_of(r, {1e-8, 1e-3, 1e-3});
+       },
+       ""},
+      {"plate", "links as thin as paper",
+       [](Report& r) {
+         moments_of(r, {1e-3, 1e-8, 1e-3 + 1e-8});
+       },
+       ""},
   };
 }
 

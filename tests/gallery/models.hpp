@@ -24,7 +24,8 @@ inline Model one_body(JointType type, const LinkInertia& inertia, const Eigen::V
 /// Principal moments.
 inline Eigen::Matrix3d moments(double x, double y, double z) { return Eigen::Vector3d(x, y, z).asDiagonal(); }
 
-/// Links of `length` along x on hinges about y and z in turn, the first at the world's origin; inertia(i) of link i, in its frame.
+/// Links of `length` along x on hinges about y and z in turn, the first at the world's origin; inertia(i) of link i, in its
+/// frame.
 template <class Inertia>
 Model hinged_chain(const std::string& name, Index links, double length, const Inertia& inertia) {
   TreeBuilder builder(name);

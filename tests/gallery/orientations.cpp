@@ -35,19 +35,21 @@ double worst_norm(const Simulation& simulation) {
   return worst;
 }
 
-/// A symmetric body on its joint, turned about one random axis after the other through several turns: its pose is known at every step, and
-/// every chart of angles has its singular poses on the way.
+/// A symmetric body on its joint, turned about one random axis after the other through several turns: its pose is known at every
+/// step, and every chart of angles has its singular poses on the way.
 void every_orientation(Report& report, JointType type) {
   const Model model = one_body(type, {1, Eigen::Vector3d::Zero(), moments(0.01, 0.01, 0.01)});
   Simulation simulation(model, {.step = 1e-3, .gravity = {0, 0, 0}, .tolerance = 1e-15});
   const std::size_t row = quaternion_row(model.tree, 1);
   Random random(1);
   const int axes = report.pick(10, 200, 5000), steps = 200;
-  const double turn = 2 * std::numbers::pi * 2.2 / steps;  // more than two whole turns about each axis, all signs of the quaternion
+  const double turn =
+      2 * std::numbers::pi * 2.2 / steps;  // more than two whole turns about each axis, all signs of the quaternion
   double off = 0, jump = 0, norm = 0;
   for (int k = 0; k < axes; ++k) {
     // the first axes are those of the charts
-    const Eigen::Vector3d axis = k < 3 ? Eigen::Vector3d(Eigen::Vector3d::Unit(k)) : Eigen::Vector3d(random.rotation() * Eigen::Vector3d::UnitZ());
+    const Eigen::Vector3d axis =
+        k < 3 ? Eigen::Vector3d(Eigen::Vector3d::Unit(k)) : Eigen::Vector3d(random.rotation() * Eigen::Vector3d::UnitZ());
     std::vector<double> v(static_cast<std::size_t>(model.tree.shape.velocities), 0.0);
     for (int i = 0; i < 3; ++i) v[static_cast<std::size_t>(i)] = axis[i] * turn / 1e-3;
     simulation.set_velocities(v);
@@ -127,10 +129,12 @@ std::vector<Case> orientation_cases() {
   return {
       {"gimbal-ball", "a ball joint turned through every orientation, all signs of its quaternion",
        [](Report& report) { every_orientation(report, JointType::ball); }, ""},
-      {"gimbal-free", "a free body turned through every orientation", [](Report& report) { every_orientation(report, JointType::free); }, ""},
+      {"gimbal-free", "a free body turned through every orientation",
+       [](Report& report) { every_orientation(report, JointType::free); }, ""},
       {"sign-flips", "quaternions given with the other sign", sign_flips, ""},
       {"spherical-chain", "1,000 ball joints in a row, bent at random, h = 0.2 ms", spherical_chain,
-       "Nothing is wrong: its bends snap at 300 rad/s, which 1 ms does not resolve. From 1.5 s on steps were split there, and refused at 4.9 s."},
+       "Nothing is wrong: its bends snap at 300 rad/s, which 1 ms does not resolve. From 1.5 s on steps were split there, and "
+       "refused at 4.9 s."},
       {"floating-tree", "1,000 bodies afloat without weight", floating_tree, ""},
   };
 }

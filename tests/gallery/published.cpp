@@ -49,7 +49,8 @@ LinkInertia capsule(double radius, double length, const Vector3d& center) {
   const double r = radius, pi = std::numbers::pi;
   const double cylinder = kDensity * pi * r * r * length, ball = kDensity * 4 / 3 * pi * r * r * r;
   const double along = cylinder * r * r / 2 + ball * 2 * r * r / 5;
-  const double across = cylinder * (3 * r * r + length * length) / 12 + ball * (2 * r * r / 5 + length * length / 4 + 3 * r * length / 8);
+  const double across =
+      cylinder * (3 * r * r + length * length) / 12 + ball * (2 * r * r / 5 + length * length / 4 + 3 * r * length / 8);
   return {cylinder + ball, center, Vector3d(across, across, along).asDiagonal()};
 }
 
@@ -106,7 +107,8 @@ Scenario sliding_pendulum(double h, std::int64_t steps) {
   last.axis = x;
   last.placement = at(0, 0.1, 0);
   last.inertia = turned(capsule(0.02, 0.1, {0, 0.05, 0}), y);
-  Scenario swinging = scenario(TreeBuilder("sliding pendulum").add(arm).add(slider).add(ball).add(last).build(), {.step = h}, steps);
+  Scenario swinging =
+      scenario(TreeBuilder("sliding pendulum").add(arm).add(slider).add(ball).add(last).build(), {.step = h}, steps);
   swinging.effects.springs = {{.row = row_of(*swinging.model, "slide"), .stiffness = 200}};
   return swinging;
 }
@@ -126,7 +128,9 @@ void energy_pendulum(Report& report) {
 ///
 /// source  google-deepmind/mujoco_warp issue 1662 and the test of its repair: 1.45e12 rad/s, where the CPU engine has 22.7
 void two_hinges(Report& report) {
-  const auto rod = [] { return LinkInertia{1, {0, 0, 0.2}, moments((3 * 0.0025 + 0.16) / 12, (3 * 0.0025 + 0.16) / 12, 0.5 * 0.0025)}; };
+  const auto rod = [] {
+    return LinkInertia{1, {0, 0, 0.2}, moments((3 * 0.0025 + 0.16) / 12, (3 * 0.0025 + 0.16) / 12, 0.5 * 0.0025)};
+  };
   LinkSpec first, second;
   first.name = "body1";
   first.joint = "joint1";
@@ -138,7 +142,8 @@ void two_hinges(Report& report) {
   second.placement = at(0, 0, 0.4);
   first.inertia = second.inertia = rod();
   const auto steps = report.pick<std::int64_t>(5000, 100'000, 1'000'000);
-  Scenario whirling = scenario(TreeBuilder("two hinges").add(first).add(second).build(), {.step = 1e-3, .gravity = {0, 0, 0}}, steps);
+  Scenario whirling =
+      scenario(TreeBuilder("two hinges").add(first).add(second).build(), {.step = 1e-3, .gravity = {0, 0, 0}}, steps);
   whirling.start = {{0.5, 0.5}, {30, -30}};
   Simulation simulation = simulation_of(whirling);
   const double across = (3 * 0.0025 + 0.16) / 12 + 0.04;
@@ -158,9 +163,12 @@ void two_hinges(Report& report) {
 
 std::vector<Case> published_cases() {
   return {
-      {"mujoco-2896", "a double pendulum of two boxes on a hinge and a ball joint, h = 0.02 s, an hour: MuJoCo 3.3.6 went NaN after 38 s",
+      {"mujoco-2896",
+       "a double pendulum of two boxes on a hinge and a ball joint, h = 0.02 s, an hour: MuJoCo 3.3.6 went NaN after 38 s",
        double_pendulum, ""},
-      {"mujoco-pendulum", "hinge, slide on a spring, ball, hinge, h = 2 ms: on its page MuJoCo's Euler diverges and its implicit method loses energy",
+      {"mujoco-pendulum",
+       "hinge, slide on a spring, ball, hinge, h = 2 ms: on its page MuJoCo's Euler diverges and its implicit method loses "
+       "energy",
        energy_pendulum, ""},
       {"mujoco-warp-1662", "two crossed hinges at 30 rad/s: reached 1.45e12 rad/s in mujoco_warp", two_hinges, ""},
   };

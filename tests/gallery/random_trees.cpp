@@ -36,7 +36,9 @@ struct Worst {
   }
 };
 
-std::vector<double> positions_of(const Simulation& simulation) { return {simulation.positions().begin(), simulation.positions().end()}; }
+std::vector<double> positions_of(const Simulation& simulation) {
+  return {simulation.positions().begin(), simulation.positions().end()};
+}
 
 /// Largest difference of coordinates; a quaternion and its opposite are not the same here, nor need they be.
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
@@ -45,9 +47,9 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return most;
 }
 
-/// Velocities go into momenta and come back, v = M^-1 (M v): what of them rounding leaves where light bodies carry heavy ones, epsilons
-/// times the condition of M. No engine knows the speed of a gram between two tonnes any better from sums in double precision.
-/// Measured here and along a few random velocities.
+/// Velocities go into momenta and come back, v = M^-1 (M v): what of them rounding leaves where light bodies carry heavy ones,
+/// epsilons times the condition of M. No engine knows the speed of a gram between two tonnes any better from sums in double
+/// precision. Measured here and along a few random velocities.
 double velocity_lost(const Simulation& simulation) {
   Simulation probe(simulation.model(), simulation.options());
   probe.set_positions(simulation.positions());
@@ -103,7 +105,9 @@ void invariants(Report& report) {
     if (!ok) {
       failed += 1;
       failed_known += lost < kLost;
-      if (failed <= 3) report.note(fmt::format("seed {}, velocities known to {:.1e}: {}", seed, lost, record.failure.empty() ? "on the way back" : record.failure));
+      if (failed <= 3)
+        report.note(fmt::format("seed {}, velocities known to {:.1e}: {}", seed, lost,
+                                record.failure.empty() ? "on the way back" : record.failure));
       continue;
     }
     at_floor += record.at_floor > 0;
@@ -116,19 +120,27 @@ void invariants(Report& report) {
     split += record.split > 0;
     if (record.split > 0) continue;
     energy.look(record.energy_error / (record.second_order + 100 * lost * record.drift.scale()), seed);
-    back.look(distance(positions_of(simulation), start) / ((tolerance * std::sqrt(mass_ratio(*moving.model)) + 100 * lost) * walk), seed);
+    back.look(
+        distance(positions_of(simulation), start) / ((tolerance * std::sqrt(mass_ratio(*moving.model)) + 100 * lost) * walk),
+        seed);
   }
   report.at_most("trees that failed though their velocities are known to 1e-6", failed_known, 0, "every step has a solution");
-  report.at_most("residual, relative", residual.value, 1e-6, "no step is taken above the ceiling of the floor of rounding (convergence.hpp)");
-  report.at_most("way back off / (the solver's tolerance and a hundred times what rounding leaves unknown, as a random walk)", back.value, 1,
+  report.at_most("residual, relative", residual.value, 1e-6,
+                 "no step is taken above the ceiling of the floor of rounding (convergence.hpp)");
+  report.at_most("way back off / (the solver's tolerance and a hundred times what rounding leaves unknown, as a random walk)",
+                 back.value, 1,
                  "the step is its own inverse; 1e-14 of the energy's root may be off, all of it the lightest body's");
   report.at_most("drift of linear momentum / (a hundred times what rounding leaves unknown, as a random walk)", linear.value, 1,
                  "a symmetry of the discrete equations");
   report.at_most("drift of angular momentum / the same", angular.value, 1, "the same");
-  report.at_most("energy error / (second order + what rounding leaves unknown)", energy.value, 1, "energy of the change of twists in a step");
-  report.note(fmt::format("{} trees of 2 to 31 bodies, {} refused, {} split a step; {} ended a step at the floor of rounding; velocities known to {:.1e} at worst (seed {}); "
-                          "worst seeds: residual {}, way back {}, momentum {} and {}, energy {}",
-                          seeds, failed, split, at_floor, lost_most.value, lost_most.seed, residual.seed, back.seed, linear.seed, angular.seed, energy.seed));
+  report.at_most("energy error / (second order + what rounding leaves unknown)", energy.value, 1,
+                 "energy of the change of twists in a step");
+  report.note(
+      fmt::format("{} trees of 2 to 31 bodies, {} refused, {} split a step; {} ended a step at the floor of rounding; velocities "
+                  "known to {:.1e} at worst (seed {}); "
+                  "worst seeds: residual {}, way back {}, momentum {} and {}, energy {}",
+                  seeds, failed, split, at_floor, lost_most.value, lost_most.seed, residual.seed, back.seed, linear.seed,
+                  angular.seed, energy.seed));
 }
 
 /// The energy error falls with the square of the step.
@@ -147,9 +159,10 @@ void energy_order(Report& report) {
   }
   std::ranges::sort(orders);
   const auto at = [&](double share) { return orders[static_cast<std::size_t>(share * static_cast<double>(orders.size() - 1))]; };
-  report.at_most("|median of the order - 2|", std::abs(at(0.5) - 2), 0.05, "the error of energy is that of the method, of second order");
-  report.note(fmt::format("{} of {} trees move enough to tell; orders {:.2f}, {:.2f}, {:.2f} at 1, 50 and 99 of 100", orders.size(), seeds, at(0.01),
-                          at(0.5), at(0.99)));
+  report.at_most("|median of the order - 2|", std::abs(at(0.5) - 2), 0.05,
+                 "the error of energy is that of the method, of second order");
+  report.note(fmt::format("{} of {} trees move enough to tell; orders {:.2f}, {:.2f}, {:.2f} at 1, 50 and 99 of 100",
+                          orders.size(), seeds, at(0.01), at(0.5), at(0.99)));
 }
 
 }  // namespace
@@ -157,8 +170,10 @@ void energy_order(Report& report) {
 std::vector<Case> random_cases() {
   return {
       {"random-trees", "random trees of all kinds, masses over 12 powers of ten", invariants,
-       "In one tree of 260 grams between tonnes leave M so ill-conditioned that double precision does not know the speeds it is given, to a digit: "
-       "M^-1 (M v) is not v. Such trees may be refused at their first steps, by name. The bounds of all others follow from the same number."},
+       "In one tree of 260 grams between tonnes leave M so ill-conditioned that double precision does not know the speeds it is "
+       "given, to a digit: "
+       "M^-1 (M v) is not v. Such trees may be refused at their first steps, by name. The bounds of all others follow from the "
+       "same number."},
       {"random-orders", "their energy as the step is halved", energy_order, ""},
   };
 }

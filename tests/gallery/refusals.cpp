@@ -37,7 +37,8 @@ void require_refused(Report& report, const Impossible& impossible) {
   } catch (const InputError& error) {
     message = error.what();
   }
-  report.at_least(impossible.what + ": refused by name", !message.empty() && message.find(impossible.named) != std::string::npos ? 1 : 0, 1,
+  report.at_least(impossible.what + ": refused by name",
+                  !message.empty() && message.find(impossible.named) != std::string::npos ? 1 : 0, 1,
                   "no motion is a solution of it");
   report.note(message.empty() ? impossible.what + ": accepted" : message);
 }
@@ -57,14 +58,21 @@ void no_inertia(Report& report) {
            Impossible{"a hinge that turns nothing", make({link("a", "", kBody), link("b", "a", none)}), "b_joint"},
            Impossible{"a point of mass on its own hinge", make({point}), "point_joint"},
            Impossible{"a slide that moves no mass",
-                      make({link("a", "", {0, Eigen::Vector3d::Zero(), moments(1, 1, 1)}, Eigen::Vector3d::UnitZ(), JointType::prismatic)}), "a_joint"},
+                      make({link("a", "", {0, Eigen::Vector3d::Zero(), moments(1, 1, 1)}, Eigen::Vector3d::UnitZ(),
+                                 JointType::prismatic)}),
+                      "a_joint"},
            Impossible{"a rod of no thickness on a ball joint",
-                      make({link("a", "", {1, {0.5, 0, 0}, moments(0, 0.1, 0.1)}, Eigen::Vector3d::UnitZ(), JointType::ball)}), "a_joint"},
-           Impossible{"two hinges about one axis, nothing between them", make({link("a", "", none), link("b", "a", kBody)}), "a_joint"},
+                      make({link("a", "", {1, {0.5, 0, 0}, moments(0, 0.1, 0.1)}, Eigen::Vector3d::UnitZ(), JointType::ball)}),
+                      "a_joint"},
+           Impossible{"two hinges about one axis, nothing between them", make({link("a", "", none), link("b", "a", kBody)}),
+                      "a_joint"},
            Impossible{"a hinge and a helix about one axis with no mass between",
-                      make({link("a", "", none), link("b", "a", none, Eigen::Vector3d::UnitZ(), JointType::prismatic), link("c", "b", kBody)}), "a_joint"},
-           Impossible{"a ball joint on a ball joint at one point", make({link("a", "", none, Eigen::Vector3d::UnitZ(), JointType::ball),
-                                                                       link("b", "a", kBody, Eigen::Vector3d::UnitZ(), JointType::ball)}),
+                      make({link("a", "", none), link("b", "a", none, Eigen::Vector3d::UnitZ(), JointType::prismatic),
+                            link("c", "b", kBody)}),
+                      "a_joint"},
+           Impossible{"a ball joint on a ball joint at one point",
+                      make({link("a", "", none, Eigen::Vector3d::UnitZ(), JointType::ball),
+                            link("b", "a", kBody, Eigen::Vector3d::UnitZ(), JointType::ball)}),
                       "a_joint"},
        }) {
     require_refused(report, one);
@@ -87,9 +95,9 @@ void contradictions(Report& report) {
   const std::string limits = "model: chain:2\neffects: {limits: {joint1: {lower: 1, upper: -1}}}\n";
   for (const Impossible& impossible : {
            Impossible{"a lower limit above the upper", [&] { TreeBuilder("backwards").add(backwards).build(); }, "a_joint"},
-           Impossible{"limits of a joint and of one that follows it without room for both", [&] { urdf_limits(tied); }, "leader_joint"},
-           Impossible{"limits of an effect exchanged",
-                      [&] { Simulation(one, {}, exchanged); }, "limits[0]"},
+           Impossible{"limits of a joint and of one that follows it without room for both", [&] { urdf_limits(tied); },
+                      "leader_joint"},
+           Impossible{"limits of an effect exchanged", [&] { Simulation(one, {}, exchanged); }, "limits[0]"},
            Impossible{"limits of a scene exchanged", [&] { Simulation(parse_scene(limits, "scene.yaml")); }, "scene.yaml:2"},
            Impossible{"a negative mass", [&] { TreeBuilder("negative").add(heavy).build(); }, "\"a\""},
            Impossible{"an inertia with a negative moment", [&] { TreeBuilder("indefinite").add(indefinite).build(); }, "\"a\""},
@@ -102,7 +110,8 @@ void contradictions(Report& report) {
 
 std::vector<Case> refusal_cases() {
   return {{"no-inertia", "joints that move nothing, alone or together", no_inertia,
-           "Two hinges about one axis with nothing between them were accepted, and the first step was not finite. Articulated inertias in a generic "
+           "Two hinges about one axis with nothing between them were accepted, and the first step was not finite. Articulated "
+           "inertias in a generic "
            "pose find such joints at load."},
           {"contradictions", "limits that contradict each other, names and numbers that make no sense", contradictions, ""}};
 }

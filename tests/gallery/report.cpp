@@ -4,8 +4,6 @@
 
 namespace linden {
 
-bool Report::kept() const {
-  return !promises_.empty() && std::ranges::all_of(promises_, &Promise::kept);
-}
+bool Report::kept() const { return !promises_.empty() && std::ranges::all_of(promises_, &Promise::kept); }
 
 }  // namespace linden

@@ -70,9 +70,10 @@ class Report {
 
 struct Case {
   std::string name;
-  std::string hard;    // what is hard, in the words of those whom it troubles
+  std::string hard;  // what is hard, in the words of those whom it troubles
   std::function<void(Report&)> measure;
-  std::string story;  // what was wrong when it first failed and what made it right, or where nature sets the limit; empty: it never failed
+  std::string story;  // what was wrong when it first failed and what made it right, or where nature sets the limit; empty: it
+                      // never failed
 };
 
 /// The families, each in a file of its own.

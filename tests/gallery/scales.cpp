@@ -42,8 +42,8 @@ double growth_of(Report& report, const Scenario& scenario, const Ended& end) {
 double walk(std::int64_t steps) { return std::sqrt(static_cast<double>(steps)); }
 
 Scenario leg(double length, double mass, double step, std::int64_t steps) {
-  Scenario swinging =
-      scenario(hinged_chain("leg", 4, length, [&](Index) { return rod(mass, length); }), {.step = step, .tolerance = kTolerance}, steps);
+  Scenario swinging = scenario(hinged_chain("leg", 4, length, [&](Index) { return rod(mass, length); }),
+                               {.step = step, .tolerance = kTolerance}, steps);
   swinging.start = random_state(*swinging.model, 1, 0.5);
   for (double& v : swinging.start.velocities) v *= 1e-3 / step;
   return swinging;
@@ -51,15 +51,16 @@ Scenario leg(double length, double mass, double step, std::int64_t steps) {
 
 /// A leg of another size, its masses and step so scaled that it moves as a leg of 1 m and 1 kg, step for step: t ~ sqrt(length).
 void scaled_leg(Report& report, double length, double mass) {
-  const auto steps = report.pick<std::int64_t>(200, 2000, 20'000);
+  const auto steps = report.pick<std::int64_t>(200, 2000, 5000);
   const double h = 1e-3 * std::sqrt(length);
   const Scenario ordinary = leg(1, 1, 1e-3, steps);
   const Ended end = end_of(report, ordinary), scaled = end_of(report, leg(length, mass, h, steps));
   const double growth = growth_of(report, ordinary, end);
   report.at_most("angles off an ordinary leg's [rad]", largest_difference(scaled.q, end.q), kTolerance * growth * walk(steps),
                  "similarity: the solver's 1e-14 a step as a random walk, grown as nearby motions part");
-  report.note(fmt::format("{} steps of {:.1e} s; speeds off by 1e-10 lead {:.1e} rad off; energy error {:.1e}, at ordinary scale {:.1e}", steps, h,
-                          1e-10 * growth, scaled.energy_error, end.energy_error));
+  report.note(
+      fmt::format("{} steps of {:.1e} s; speeds off by 1e-10 lead {:.1e} rad off; energy error {:.1e}, at ordinary scale {:.1e}",
+                  steps, h, 1e-10 * growth, scaled.energy_error, end.energy_error));
 }
 
 /// A falling, moving humanoid a thousand kilometres away from the world's origin on every axis.
@@ -104,7 +105,7 @@ void fast_body(Report& report) {
 
 /// Joints at 100,000 turns, of which the unit in the last place is 1.2e-10 rad.
 void wound_up(Report& report) {
-  const auto steps = report.pick<std::int64_t>(200, 2000, 20'000);
+  const auto steps = report.pick<std::int64_t>(200, 2000, 5000);
   const double wound = 2 * std::numbers::pi * 1e5;
   const Scenario plain = leg(1, 1, 1e-3, steps);
   Scenario wound_leg = plain;
@@ -113,10 +114,11 @@ void wound_up(Report& report) {
   Ended other = end_of(report, wound_leg);
   const double growth = growth_of(report, plain, end);
   for (double& q : other.q) q -= wound;
-  report.at_most("angles off those without the turns [rad]", largest_difference(other.q, end.q), kEpsilon * wound * growth * walk(steps),
+  report.at_most("angles off those without the turns [rad]", largest_difference(other.q, end.q),
+                 kEpsilon * wound * growth * walk(steps),
                  "a number near 628,318 has that many epsilons: rounding of the angle itself, as a random walk");
-  report.note(fmt::format("speeds off by 1e-10 lead {:.1e} rad off; energy error {:.1e}, without the turns {:.1e}", 1e-10 * growth, other.energy_error,
-                          end.energy_error));
+  report.note(fmt::format("speeds off by 1e-10 lead {:.1e} rad off; energy error {:.1e}, without the turns {:.1e}",
+                          1e-10 * growth, other.energy_error, end.energy_error));
 }
 
 }  // namespace

@@ -134,13 +134,14 @@ void promise_no_slope(Report& report, const RunRecord& record) {
   const double visible = std::max(0.0, std::abs(record.drift.slope()) - 5 * record.drift.slope_error());
   report.at_most("visible slope of energy x time / second order", visible * record.duration / record.second_order, 0.1,
                  "visible: beyond five standard errors; what is left is the wandering of a chaotic motion within its band");
-  report.note(fmt::format("slope {:+.1e} ± {:.1e} of the largest kinetic energy a second", record.drift.slope() / record.drift.scale(),
-                          record.drift.slope_error() / record.drift.scale()));
+  report.note(fmt::format("slope {:+.1e} ± {:.1e} of the largest kinetic energy a second",
+                          record.drift.slope() / record.drift.scale(), record.drift.slope_error() / record.drift.scale()));
 }
 
 std::string effort(const RunRecord& record) {
-  std::string text = fmt::format("{:.2f} iterations a step, {} at most", static_cast<double>(record.iterations) / static_cast<double>(record.steps),
-                                 record.most_iterations);
+  std::string text =
+      fmt::format("{:.2f} iterations a step, {} at most",
+                  static_cast<double>(record.iterations) / static_cast<double>(record.steps), record.most_iterations);
   if (record.split > 0) text += fmt::format("; {} of {} steps split", grouped(record.split), grouped(record.steps));
   if (record.at_floor > 0) text += fmt::format("; {} ended at the floor of rounding", grouped(record.at_floor));
   return text;

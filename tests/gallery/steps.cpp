@@ -75,7 +75,8 @@ void turn_per_step(Report& report) {
   reported += step.status == StepStatus::past_pi && step.slot == 2;
   kept = static_cast<double>(asked - reported);
   report.at_most("turns above pi that were not reported", kept, 0, "log has one value below half a turn and others above");
-  report.at_most("error of a step that was split [rad]", split_error, 64 * kEpsilon * 2.5 * kPi, "an epsilon of the angle each of 16 parts");
+  report.at_most("error of a step that was split [rad]", split_error, 64 * kEpsilon * 2.5 * kPi,
+                 "an epsilon of the angle each of 16 parts");
   if (!step.ok()) report.note(summed.describe(step));
 }
 
@@ -83,7 +84,8 @@ void turn_per_step(Report& report) {
 using ErrorAt = std::function<double(double h)>;
 
 /// Order from the errors at h and h / 2, worst over the ladder.
-void promise_order(Report& report, const std::string& what, const ErrorAt& error, std::initializer_list<double> ladder, double margin) {
+void promise_order(Report& report, const std::string& what, const ErrorAt& error, std::initializer_list<double> ladder,
+                   double margin) {
   double worst = 0;
   std::string told;
   for (const double h : ladder) {
@@ -173,12 +175,14 @@ void beyond_steps(Report& report) {
     const bool told = !record.failure.empty() || record.split > 0;
     if (!told) silent = std::max(silent, off);
     report.note(fmt::format("chain at {:.0f} ms: {}, energy off by {:.2g} of the largest kinetic energy", 1e3 * h,
-                            record.failure.empty() ? fmt::format("{} of {} steps split", record.split, record.steps)
-                                                   : fmt::format("refused at {:.2f} s, {} of {} steps before split",
-                                                                 static_cast<double>(record.steps) * h, record.split, record.steps),
+                            record.failure.empty()
+                                ? fmt::format("{} of {} steps split", record.split, record.steps)
+                                : fmt::format("refused at {:.2f} s, {} of {} steps before split",
+                                              static_cast<double>(record.steps) * h, record.split, record.steps),
                             off));
   }
-  report.at_most("energy error where no step was split or refused", silent, 0.25, "a step that gains a quarter is refused (convergence.hpp)");
+  report.at_most("energy error where no step was split or refused", silent, 0.25,
+                 "a step that gains a quarter is refused (convergence.hpp)");
 }
 
 }  // namespace

@@ -13,7 +13,8 @@ const std::vector<double> kStiffnesses{1, 1e3, 1e6, 1e9};
 constexpr double kLength = 0.1;  // of a link [m]
 constexpr double kSpread = 0.2;  // of the start [rad, rad/s]
 
-/// Weight acts at the ends of a step, and the middle of a parabola lies h^2 g / 8 beside its chord: that share of a link's length.
+/// Weight acts at the ends of a step, and the middle of a parabola lies h^2 g / 8 beside its chord: that share of a link's
+/// length.
 const double kSag = 0.01 * 0.01 * 9.81 / (8 * kLength);
 const std::string kWhySag = "passive: none but what weight makes in a step of 10 ms, h^2 g / 8 l";
 
@@ -28,9 +29,9 @@ struct Gained {
   std::string failure;
 };
 
-/// Energy of the motion from step to step, its mean speed in the middle of the way: what is read off after a step, from momenta with the
-/// push of one end in them, says nothing of a joint that a stiff thing stopped within that step. Everything here is passive, so the
-/// energy of the start, that of springs and servos included, is all there ever is.
+/// Energy of the motion from step to step, its mean speed in the middle of the way: what is read off after a step, from momenta
+/// with the push of one end in them, says nothing of a joint that a stiff thing stopped within that step. Everything here is
+/// passive, so the energy of the start, that of springs and servos included, is all there ever is.
 Gained gain(const Scenario& scenario) {
   Gained gained;
   Simulation simulation = simulation_of(scenario);
@@ -45,7 +46,8 @@ Gained gain(const Scenario& scenario) {
   };
   const double start = energy_at(simulation.positions(), simulation.velocities()).total();
   gained.scale = std::abs(start);
-  std::vector<double> before(simulation.positions().begin(), simulation.positions().end()), middle(before.size()), speed(before.size());
+  std::vector<double> before(simulation.positions().begin(), simulation.positions().end()), middle(before.size()),
+      speed(before.size());
   for (std::int64_t k = 0; k < scenario.steps; ++k) {
     const StepReport step = simulation.step();
     if (!step.ok()) {
@@ -102,7 +104,8 @@ void over_stiffnesses(Report& report, const Model& model, const std::string& wha
         worst = gained.most;
         report.note(fmt::format("{} {:.0e} at {} ms: {}", what, k, 1e3 * h, gained.failure));
       }
-      told += fmt::format("{}{:.0e} at {:.0f} ms {:.1e}", told.empty() ? what + ": " : ", ", k, 1e3 * h, gained.most / gained.scale);
+      told +=
+          fmt::format("{}{:.0e} at {:.0f} ms {:.1e}", told.empty() ? what + ": " : ", ", k, 1e3 * h, gained.most / gained.scale);
     }
   }
   report.at_most(what + ": energy gained / largest energy", worst, kSag, kWhySag);
@@ -182,7 +185,8 @@ void ground(Report& report) {
     effects.ground = Ground{.height = -0.5, .stiffness = k, .damping = 1e-3 * k, .friction = 0.8};
     for (const double x : {-0.1, 0.1}) {
       for (const double y : {-0.1, 0.1}) {
-        for (const double z : {-0.05, 0.05}) effects.ground->contacts.spheres.push_back({.slot = 1, .center = {x, y, z}, .radius = 0});
+        for (const double z : {-0.05, 0.05})
+          effects.ground->contacts.spheres.push_back({.slot = 1, .center = {x, y, z}, .radius = 0});
       }
     }
     return effects;
@@ -198,7 +202,8 @@ std::vector<Case> stiff_cases() {
       {"stiff-servos", "servos of 1 to 1e9 N m/rad and a tenth of that in damping", servos, ""},
       {"stiff-ground", "a box of 2 kg falls on ground of 1 to 1e9 N/m with friction", ground, ""},
       {"stiff-together", "springs that push joints against their limits, dampers, friction", together,
-       "Velocities read in the two steps after a stiff thing stopped a joint are those of the blow, up to 300 times the speed at which it moves on: "
+       "Velocities read in the two steps after a stiff thing stopped a joint are those of the blow, up to 300 times the speed at "
+       "which it moves on: "
        "the positions are right, so the energy is that of the motion from step to step."},
   };
 }

@@ -42,8 +42,8 @@ std::string text_of(const Shown& shown) {
   const Report& report = shown.report;
   std::string text = fmt::format("{} {} ({:.1f} s)\n", report.kept() ? "kept  " : "BROKEN", shown.shown->name, shown.seconds);
   for (const Promise& promise : report.promises()) {
-    text += fmt::format("       {} {}: measured {} ({})\n", promise.kept() ? " " : "!", bound_of(promise), number(promise.measured),
-                        promise.reason);
+    text += fmt::format("       {} {}: measured {} ({})\n", promise.kept() ? " " : "!", bound_of(promise),
+                        number(promise.measured), promise.reason);
   }
   for (const std::string& note : report.notes()) text += fmt::format("         {}\n", note);
   for (const Besides& other : report.besides()) text += fmt::format("         {}: {}\n", other.engine, other.found);
