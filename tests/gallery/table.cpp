@@ -65,7 +65,6 @@ std::string markdown_of(const std::vector<Shown>& gallery) {
       promised += fmt::format("{}{}", gap, cell(bound_of(promise)));
       measured += fmt::format("{}{}{}", gap, number(promise.measured), promise.kept() ? "" : " **broken**");
     }
-    for (const std::string& note : shown.report.notes()) measured += "<br>" + cell(note);
     text += fmt::format("| `{}` | {} | {} | {} |", shown.shown->name, cell(shown.shown->hard), promised, measured);
     for (const std::string& engine : engines) {
       const auto& besides = shown.report.besides();

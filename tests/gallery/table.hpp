@@ -19,7 +19,7 @@ struct Shown {
 std::string text_of(const Shown& shown);
 
 /// Case, what is hard, what is promised, what was measured; a column for each other engine that was there. Below: what first
-/// failed.
+/// failed. Notes are left to the text.
 std::string markdown_of(const std::vector<Shown>& gallery);
 
 /// A row a promise: case,what,measured,relation,bound,kept,reason; and a row for each other engine.
