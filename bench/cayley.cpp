@@ -250,7 +250,7 @@ int main() {
     for (const long double component : body.orientation(0)) tumbling.start.positions.push_back(static_cast<double>(component));
     for (const long double component : body.velocity(0)) tumbling.start.velocities.push_back(static_cast<double>(component));
     const auto top_q = LagrangeTop::start();
-    const auto top_v = LagrangeTop::start_velocity();
+    const auto top_v = LagrangeTop().start_velocity();
     const Model humanoid = load_urdf(LINDEN_MODELS_DIR "/humanoid.urdf", Base::floating), links = chain(10);
     const Case cases[] = {
         {"pendulum", Pendulum::model(), {{2.8}, {0}}, {0, 0, -9.81}, 10, 8e-3},

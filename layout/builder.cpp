@@ -418,11 +418,6 @@ class Build {
     }
   }
 
-  /// Who leads a joint in the end: q = multiplier q_leader + offset. Who follows nobody leads itself.
-  struct Leader {
-    std::size_t link;
-    double multiplier = 1, offset = 0;
-  };
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
   using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;  // columns: twists (w, v) that a joint frees
 
@@ -484,10 +479,9 @@ class Build {
       const Matrix6d own = spatial(body.inertia), A = yielding[at] + own, whole = held[at] + own;
       const Eigen::MatrixXd d = S.transpose() * A * S;
       if (!(least_eigenvalue(d) > kMovesNothingOfItsOwn * (S.transpose() * whole * S).trace())) {
-        fail(fmt::format(
-            "joint \"{}\" moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
-            "joints that each move something of their own; give link \"{}\" an inertia, or fix one of the joints",
-            body.joint, body.link));
+        fail(fmt::format("joint {} moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
+                         "joints that each move something of their own; give link {} an inertia, or fix one of the joints",
+                         quoted(body.joint), quoted(body.link)));
       }
       if (body.parent < 0) continue;
       const Matrix6d left = A - A * S * d.ldlt().solve(Eigen::MatrixXd(S.transpose() * A));
@@ -503,6 +497,12 @@ class Build {
       held[parent] += to_child.transpose() * whole * to_child;
     }
   }
+
+  /// Who leads a joint in the end: q = multiplier q_leader + offset. Who follows nobody leads itself.
+  struct Leader {
+    std::size_t link;
+    double multiplier = 1, offset = 0;
+  };
 
   void resolve_mimics() {
     std::vector<std::optional<Leader>> leaders(links_.size());

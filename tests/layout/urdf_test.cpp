@@ -733,6 +733,8 @@ TEST_CASE("names of any length and kind are cut and kept on one line in messages
 TEST_CASE("a file without end is refused") {
   if (!std::filesystem::exists("/dev/zero")) return;
   REQUIRE_THROWS_WITH(load_urdf("/dev/zero"), StartsWith("/dev/zero: it is longer than ") && Contains("; expected a URDF"));
+}
+
 TEST_CASE("joints that move the same in the same way, with nothing between them, are refused by name") {
   const std::string empty = R"(<link name="b"/>)", end = link("c");
   const auto xml = [&](const std::string& first, const std::string& second, const std::string& more = "") {

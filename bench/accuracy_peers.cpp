@@ -1,0 +1,191 @@
+// bench/accuracy_peers.cpp
+// What other engines keep of the energy, and for how much CPU time, beside linden's orders: ten-link chain and tumbling humanoid.
+//
+//   build/release/bench/bench_accuracy_peers FILE.csv [SECONDS]
+//
+// SECONDS: of the longest runs, default 1,000, some ten minutes in all. Each engine starts from linden's numbers (bench/peer.hpp), takes
+// steps of 4, 2, 1 and 0.5 ms (the last not beyond 10 s), and is asked for its own energy every 16 ms. All of it is on one thread.
+//
+//   energy_band   largest less smallest total energy, over the largest kinetic energy that linden's order 6 meets in that time
+//   cpu           of the steps alone, for a simulated second
+//
+// Before anything is measured an engine must have the same energy as linden at the start, to its rounding, and be within 1e-4 of linden
+// after 20 ms in steps of 10 us.
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+#include "bench/peer.hpp"
+#include "engine/drift.hpp"
+#include "layout/urdf.hpp"
+#include "models/generators.hpp"
+
+namespace {
+
+using namespace linden;
+
+constexpr double kEvery = 16e-3;  // [s]
+constexpr double kSteps[] = {4e-3, 2e-3, 1e-3, 0.5e-3};
+constexpr double kFine = 0.5e-3, kLongestFine = 10;
+
+struct Stage {
+  Robot robot;
+  double gravity;
+  InitialState start;
+};
+
+/// A Simulation of some order as a Peer.
+class OrderPeer final : public Peer {
+ public:
+  OrderPeer(const Robot& robot, const Plan& plan, int order) : simulation_(robot.model, options(plan, order)) {}
+
+  double mass() const override { return simulation_.model().constants.subtree_mass(0); }
+  Index degrees_of_freedom() const override { return simulation_.model().degrees_of_freedom(); }
+  void reset(std::int64_t, const InitialState& start) override {
+    simulation_.set_positions(start.positions);
+    simulation_.set_velocities(start.velocities);
+  }
+  void step(int n) override {
+    for (int k = 0; k < n; ++k) {
+      if (const StepReport report = simulation_.step(); !report.ok()) throw std::runtime_error(simulation_.describe(report));
+    }
+  }
+  std::vector<double> positions(std::int64_t) override { return {simulation_.positions().begin(), simulation_.positions().end()}; }
+  Energy energy(std::int64_t) override { return simulation_.energy(); }
+
+ private:
+  static Options options(const Plan& plan, int order) {
+    Options options{.step = plan.step, .gravity = {0, 0, -plan.gravity}};
+    options.order = order;
+    options.tolerance = default_tolerance(order);
+    return options;
+  }
+  Simulation simulation_;
+};
+
+Contender of_order(int order) {
+  return {fmt::format("linden order {}", order), "", true, false, 1e-12,
+          [order](const Robot& robot, const Plan& plan) { return std::make_unique<OrderPeer>(robot, plan, order); }};
+}
+
+std::vector<Contender> contenders() {
+  std::vector<Contender> all;
+  for (const int order : {2, 4, 6}) all.push_back(of_order(order));
+#ifdef LINDEN_WITH_MUJOCO
+  std::ranges::copy(mujoco_contenders(), std::back_inserter(all));
+#endif
+#ifdef LINDEN_WITH_DART
+  for (const Contender& one : dart_contenders()) {
+    if (one.alone) all.push_back(one);
+  }
+#endif
+  return all;
+}
+
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+void require_same(const Contender& contender, const Stage& scene) {
+  const Plan plan{.step = 1e-5, .gravity = scene.gravity};
+  const auto linden = of_order(2).make(scene.robot, plan), peer = contender.make(scene.robot, plan);
+  linden->reset(0, scene.start);
+  peer->reset(0, scene.start);
+  const double scale = linden->energy(0).kinetic + linden->mass() * 9.81;
+  if (!(std::abs(peer->energy(0).total() - linden->energy(0).total()) < contender.rounding * scale)) {
+    throw std::runtime_error(fmt::format("{} has {} J at the start of {}, linden {} J", contender.name, peer->energy(0).total(),
+                                         scene.robot.name, linden->energy(0).total()));
+  }
+  linden->step(2000);
+  peer->step(2000);
+  const std::vector<double> a = linden->positions(0), b = peer->positions(0);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    // a quaternion and its opposite are one rotation; components of no other kind have the opposite sign
+    const double apart = std::min(std::abs(a[k] - b[k]), std::abs(a[k] + b[k]));
+    if (!(apart < 1e-4)) throw std::runtime_error(fmt::format("{} is {} from linden after 20 ms of {}", contender.name, apart, scene.robot.name));
+  }
+}
+
+struct Conserved {
+  double band = 0, slope = 0, kinetic = 0, cpu = 0;
+  std::string failure;
+};
+
+Conserved run(const Contender& contender, const Stage& scene, double step, double duration) {
+  const auto peer = contender.make(scene.robot, {.step = step, .gravity = scene.gravity});
+  peer->reset(0, scene.start);
+  const auto samples = std::llround(duration / kEvery);
+  const int chunk = static_cast<int>(std::lround(kEvery / step));
+  EnergyDrift drift(samples + 1);
+  Conserved kept;
+  drift.add(0, peer->energy(0));
+  try {
+    for (std::int64_t k = 1; k <= samples; ++k) {
+      const double begin = cpu_seconds();
+      peer->step(chunk);
+      kept.cpu += cpu_seconds() - begin;
+      const Energy now = peer->energy(0);
+      if (!std::isfinite(now.total())) throw std::runtime_error("its energy is not finite");
+      drift.add(static_cast<double>(k) * kEvery, now);
+    }
+  } catch (const std::exception& error) {
+    kept.failure = error.what();
+  }
+  kept.band = drift.band();
+  kept.slope = drift.slope();
+  kept.kinetic = drift.scale();
+  kept.cpu /= duration;
+  return kept;
+}
+
+std::vector<Stage> scenes() {
+  const auto links = std::make_shared<const Model>(chain(10));
+  const std::string file = LINDEN_MODELS_DIR "/humanoid.urdf";
+  const auto humanoid = std::make_shared<const Model>(load_urdf(file, Base::floating));
+  return {{{"chain:10", "", links}, 9.81, {links->neutral(), std::vector<double>(10, 0.0)}},
+          {{"humanoid", file, humanoid}, 0, random_state(*humanoid, 1, 0.5)}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2 || argc > 3) {
+    fmt::print(stderr, "expected: bench_accuracy_peers FILE.csv [SECONDS]\n");
+    return 2;
+  }
+  try {
+    const double longest = argc > 2 ? std::stod(argv[2]) : 1000;
+    std::ofstream csv(argv[1]);
+    if (!csv) throw std::runtime_error(fmt::format("{} cannot be written", argv[1]));
+    csv << "model,engine,step_s,duration_s,energy_band,energy_slope_per_s,cpu_s_per_s,failure\n";
+    fmt::print("{:<10} {:<18} {:>8} {:>8}  {:<10} {:<11} {:>12}\n", "model", "engine", "h [ms]", "over [s]", "band", "slope [1/s]", "CPU [ms/s]");
+    for (const Stage& scene : scenes()) {
+      for (const Contender& contender : contenders()) require_same(contender, scene);
+      for (const double duration : {1.0, 10.0, longest}) {
+        const double kinetic = run(of_order(6), scene, 1e-3, std::min(duration, kLongestFine)).kinetic;
+        for (const Contender& contender : contenders()) {
+          for (const double step : kSteps) {
+            if (step == kFine && duration > kLongestFine) continue;
+            const Conserved kept = run(contender, scene, step, duration);
+            fmt::print("{:<10} {:<18} {:>8g} {:>8g}  {:<10.1e} {:<11.1e} {:>12.4g}  {}\n", scene.robot.name, contender.name, 1e3 * step, duration,
+                       kept.band / kinetic, kept.slope / kinetic, 1e3 * kept.cpu, kept.failure);
+            std::fflush(stdout);
+            csv << fmt::format("{},{},{},{},{:.3g},{:.3g},{:.4g},\"{}\"\n", scene.robot.name, contender.name, step, duration, kept.band / kinetic,
+                               kept.slope / kinetic, kept.cpu, kept.failure);
+          }
+        }
+      }
+    }
+    return csv.flush() ? 0 : 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bench_accuracy_peers: {}\n", error.what());
+    return 1;
+  }
+}
