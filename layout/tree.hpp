@@ -39,7 +39,7 @@ namespace linden {
 enum class JointKind : std::uint8_t { screw, ball, free };
 
 /// Most bodies of a branch, some 900 bytes each, and of a subtree in it. Both ways over one branch and then the next, a step of a binary
-/// tree of 16,383 takes 83 ns a body instead of 87, of 65,535 142 instead of 161 (EPYC Zen 5, 1 MB of second cache).
+/// tree of 16,383 takes 85 ns a body instead of 87, of 65,535 133 instead of 142 (EPYC Zen 5, 1 MB of second cache).
 inline constexpr Index kBranch = 1024;
 inline constexpr Index kTwig = 32;
 
