@@ -8,6 +8,7 @@
 #include <optional>
 #include <unordered_set>
 
+#include "layout/dependent_joint.hpp"
 #include "layout/origin_inertia.hpp"
 #include "layout/words.hpp"
 
@@ -26,10 +27,6 @@ constexpr double kTriangleSlack = 1e-9;
 
 /// A joint is taken to move nothing when the inertia it feels is below this share of what its subtree could have.
 constexpr double kMovesNothing = 1e-14;
-
-/// And to move only what other joints can move in the same way when, those yielding, it feels less than this share of what it
-/// feels while they are held. Light bodies between heavy ones come to 1e-12, rounding to 1e-15.
-constexpr double kMovesNothingOfItsOwn = 1e-13;
 
 /// A moving body before sorting: parents are indices into the same list, -1 the world.
 struct Body {
@@ -418,84 +415,13 @@ class Build {
     }
   }
 
-  using Matrix6d = Eigen::Matrix<double, 6, 6>;
-  using Motions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;  // columns: twists (w, v) that a joint frees
-
-  static Motions motions_of(const Body& body) {
-    if (body.kind == JointKind::free) return Matrix6d::Identity();
-    if (body.kind == JointKind::ball) return Matrix6d::Identity().leftCols<3>();
-    Motions screw = Motions::Zero(6, 1);
-    screw(2, 0) = body.turn;
-    screw(5, 0) = body.shift;
-    return screw;
-  }
-
-  /// Placement in the parent with the joint moved by an amount that no two joints of a model share and that no robot is built
-  /// for.
-  static Isometry3d placement_in_generic_pose(const Body& body, Index slot) {
-    const double amount = 0.7 + 0.13 * static_cast<double>(slot % 7) + 0.29 * static_cast<double>(slot % 5);
-    Isometry3d pose = body.placement;
-    if (body.kind == JointKind::screw) {
-      pose.rotate(Eigen::AngleAxisd(body.turn * amount, Vector3d::UnitZ()));
-      pose.translate(body.shift * amount * Vector3d::UnitZ());
-    } else {
-      pose.rotate(Eigen::AngleAxisd(amount, Vector3d(1, 0.6, -0.8).normalized()));
-    }
-    return pose;
-  }
-
-  static Matrix6d spatial(const OriginInertia& inertia) {
-    const Vector3d& c = inertia.moment;
-    Matrix3d hat;
-    hat << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
-    Matrix6d G;
-    G << inertia.about_origin, hat, -hat, inertia.mass * Matrix3d::Identity();
-    return G;
-  }
-
-  static double least_eigenvalue(const Eigen::MatrixXd& matrix) {
-    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (matrix + matrix.transpose()), Eigen::EigenvaluesOnly)
-        .eigenvalues()[0];
-  }
-
-  /// No motion of the joints may leave all mass at rest, as that of two hinges about one axis with nothing between them: seen
-  /// from the root, each joint must feel inertia while all those below it yield (articulated inertia: Featherstone, Rigid Body
-  /// Dynamics Algorithms, 7.2). In a generic pose, since many a wrist can do so in its zero pose and in no other. Where every
-  /// body has an inertia of its own there is nothing to look for.
   void check_independence() const {
-    const Index slots = model_.tree.shape.slots;
-    bool all_of_their_own = true;
-    for (Index i = 1; i < slots && all_of_their_own; ++i) {
-      const Motions S = motions_of(in_slot(i));
-      all_of_their_own = least_eigenvalue(S.transpose() * spatial(in_slot(i).inertia) * S) > 0;
-    }
-    if (all_of_their_own) return;
-    std::vector<Matrix6d, Eigen::aligned_allocator<Matrix6d>> yielding(static_cast<std::size_t>(slots), Matrix6d::Zero()),
-        held = yielding;
-    for (Index i = slots - 1; i > 0; --i) {
-      const Body& body = in_slot(i);
-      const auto at = static_cast<std::size_t>(i);
-      const Motions S = motions_of(body);
-      const Matrix6d own = spatial(body.inertia), A = yielding[at] + own, whole = held[at] + own;
-      const Eigen::MatrixXd d = S.transpose() * A * S;
-      if (!(least_eigenvalue(d) > kMovesNothingOfItsOwn * (S.transpose() * whole * S).trace())) {
-        fail(fmt::format("joint {} moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
-                         "joints that each move something of their own; give link {} an inertia, or fix one of the joints",
-                         quoted(body.joint), quoted(body.link)));
-      }
-      if (body.parent < 0) continue;
-      const Matrix6d left = A - A * S * d.ldlt().solve(Eigen::MatrixXd(S.transpose() * A));
-      const Isometry3d pose = placement_in_generic_pose(body, i);
-      const Matrix3d R = pose.linear();
-      const Vector3d p = pose.translation();
-      Matrix3d hat;
-      hat << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
-      Matrix6d to_child;  // twists
-      to_child << R.transpose(), Matrix3d::Zero(), -R.transpose() * hat, R.transpose();
-      const auto parent = static_cast<std::size_t>(slot_of(body.parent));
-      yielding[parent] += to_child.transpose() * left * to_child;
-      held[parent] += to_child.transpose() * whole * to_child;
-    }
+    const Index slot = dependent_joint(model_);
+    if (slot == 0) return;
+    const Body& body = in_slot(slot);
+    fail(fmt::format("joint {} moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
+                     "joints that each move something of their own; give link {} an inertia, or fix one of the joints",
+                     quoted(body.joint), quoted(body.link)));
   }
 
   /// Who leads a joint in the end: q = multiplier q_leader + offset. Who follows nobody leads itself.
