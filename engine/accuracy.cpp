@@ -272,7 +272,8 @@ class Measurement {
       reference.failure = "no run of RK4 came to its end";
       return;
     }
-    judge(std::move(*ours), agreement(*ours, *theirs), kAgreed);
+    const Agreement found = agreement(*ours, *theirs);
+    judge(std::move(*ours), found, kAgreed);
   }
 
   /// Where no other method knows the effects: order 2 against itself at twice the step.

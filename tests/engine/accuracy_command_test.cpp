@@ -21,7 +21,7 @@ std::vector<nlohmann::json> ladder(const nlohmann::json& json, const std::string
 TEST_CASE("accuracy measures every method on a ladder of steps, finds their orders and says what to take", "[command line]") {
   const Shell shell;
   const Outcome outcome = shell.linden("accuracy tree:7 --spread 1 --duration 0.32 --dt 2e-3 --budget 60 --json a.json");
-  CHECK(outcome.exit_code == 0);
+  REQUIRE(outcome.exit_code == 0);
   CHECK(outcome.err.empty());
   CHECK_THAT(outcome.out,
              Contains("agree to") && Contains("over all 0.32 s") && Contains("energy band") && Contains("evaluations"));
@@ -62,7 +62,7 @@ TEST_CASE("a chaotic motion is recognised, judged on a horizon and by its energy
           "[command line]") {
   const Shell shell;
   const Outcome outcome = shell.linden("accuracy chain:10 --duration 3 --budget 60 --json a.json");
-  CHECK(outcome.exit_code == 0);
+  REQUIRE(outcome.exit_code == 0);
   CHECK_THAT(outcome.out, Contains("as on a chaotic motion: errors are judged there"));
   CHECK_THAT(outcome.out, Contains("semi-implicit Euler, h = 4 ms: at 1.784 s: the result is not finite"));
   const nlohmann::json json = json_of(shell / "a.json");

@@ -8,10 +8,7 @@
 #include "engine/text.hpp"
 #include "tests/gallery/scenario.hpp"
 #if defined(LINDEN_WITH_MUJOCO) || defined(LINDEN_WITH_DART)
-#include <fcntl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
+#include "bench/apart.hpp"
 #include "bench/peer.hpp"
 #endif
 
@@ -68,45 +65,13 @@ std::string found_by(const Contender& contender, const Scenario& scenario, doubl
                                 : fmt::format("{:.1e}", off);
 }
 
-/// What `find` says, in a process of its own: an engine whose assertions fail ends that one, and what it prints nobody sees.
-template <class Find>
-std::string apart(const Find& find) {
-  int ends[2];
-  if (::pipe(ends) != 0) return "no pipe";
-  const pid_t child = ::fork();
-  if (child < 0) return "no process";
-  if (child == 0) {
-    ::close(ends[0]);
-    const int nowhere = ::open("/dev/null", O_WRONLY);
-    ::dup2(nowhere, STDOUT_FILENO);
-    ::dup2(nowhere, STDERR_FILENO);
-    std::string found;
-    try {
-      found = find();
-    } catch (const std::exception& error) {
-      found = fmt::format("refuses: {}", error.what());
-    }
-    const bool told = ::write(ends[1], found.data(), found.size()) >= 0;
-    ::_exit(told ? 0 : 1);
-  }
-  ::close(ends[1]);
-  std::string found;
-  char part[256];
-  for (ssize_t size = 0; (size = ::read(ends[0], part, sizeof part)) > 0;) found.append(part, static_cast<std::size_t>(size));
-  ::close(ends[0]);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  if (WIFSIGNALED(status)) return "ends the program: an assertion fails";
-  return found.empty() ? "ends the program" : printable(found);
-}
-
 }  // namespace
 
 void run_beside(Report& report, const Scenario& scenario, double scale) {
   if (!report.peers() || scenario.model->tree.bodies() > kMostBodies) return;
   for (const Contender& contender : contenders()) {
     const std::string found = apart([&] { return found_by(contender, scenario, scale); });
-    report.beside(contender.description, found);
+    report.beside(contender.description, printable(found));
   }
 }
 #else
