@@ -68,6 +68,7 @@ void write_for_mujoco(const Robot& robot, const std::string& target) {
   XMLElement* size = mujoco->InsertNewChildElement("size");  // room for constraints is 13 MB an instance otherwise
   size->SetAttribute("njmax", "0");
   size->SetAttribute("nconmax", "0");
+  size->SetAttribute("nstack", "100000");  // numbers; the implicit integrator's need, not counted by MuJoCo without constraints
   if (!floats(root)) set_afloat(root, robot.model->names.body[1], robot.model->names.joint[1]);
   if (text.SaveFile(target.c_str()) != tinyxml2::XML_SUCCESS) throw std::runtime_error(text.ErrorStr());
 }
