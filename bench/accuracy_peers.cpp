@@ -22,7 +22,7 @@
 #include <stdexcept>
 
 #include "bench/apart.hpp"
-#include "bench/peer.hpp"
+#include "bench/installed_peers.hpp"
 #include "engine/drift.hpp"
 #include "layout/urdf.hpp"
 #include "models/generators.hpp"
@@ -42,51 +42,12 @@ struct Stage {
   InitialState start;
 };
 
-/// A Simulation of some order as a Peer.
-class OrderPeer final : public Peer {
- public:
-  OrderPeer(const Robot& robot, const Plan& plan, int order) : simulation_(robot.model, options(plan, order)) {}
-
-  double mass() const override { return simulation_.model().constants.subtree_mass(0); }
-  Index degrees_of_freedom() const override { return simulation_.model().degrees_of_freedom(); }
-  void reset(std::int64_t, const InitialState& start) override {
-    simulation_.set_positions(start.positions);
-    simulation_.set_velocities(start.velocities);
-  }
-  void step(int n) override {
-    for (int k = 0; k < n; ++k) {
-      if (const StepReport report = simulation_.step(); !report.ok()) throw std::runtime_error(simulation_.describe(report));
-    }
-  }
-  std::vector<double> positions(std::int64_t) override { return {simulation_.positions().begin(), simulation_.positions().end()}; }
-  Energy energy(std::int64_t) override { return simulation_.energy(); }
-
- private:
-  static Options options(const Plan& plan, int order) {
-    Options options{.step = plan.step, .gravity = {0, 0, -plan.gravity}};
-    options.order = order;
-    options.tolerance = default_tolerance(order);
-    return options;
-  }
-  Simulation simulation_;
-};
-
-Contender of_order(int order) {
-  return {fmt::format("linden order {}", order), "", true, false, 1e-12,
-          [order](const Robot& robot, const Plan& plan) { return std::make_unique<OrderPeer>(robot, plan, order); }};
-}
-
 std::vector<Contender> contenders() {
   std::vector<Contender> all;
-  for (const int order : {2, 4, 6}) all.push_back(of_order(order));
-#ifdef LINDEN_WITH_MUJOCO
-  std::ranges::copy(mujoco_contenders(), std::back_inserter(all));
-#endif
-#ifdef LINDEN_WITH_DART
-  for (const Contender& one : dart_contenders()) {
+  for (const int order : {2, 4, 6}) all.push_back(linden_of_order(order));
+  for (const Contender& one : installed_peers()) {
     if (one.alone) all.push_back(one);
   }
-#endif
   return all;
 }
 
@@ -98,7 +59,7 @@ double cpu_seconds() {
 
 void require_same(const Contender& contender, const Stage& scene) {
   const Plan plan{.step = 1e-5, .gravity = scene.gravity};
-  const auto linden = of_order(2).make(scene.robot, plan), peer = contender.make(scene.robot, plan);
+  const auto linden = linden_of_order(2).make(scene.robot, plan), peer = contender.make(scene.robot, plan);
   linden->reset(0, scene.start);
   peer->reset(0, scene.start);
   const double scale = linden->energy(0).kinetic + linden->mass() * 9.81;
@@ -190,7 +151,7 @@ int main(int argc, char** argv) {
     for (const Stage& scene : scenes()) {
       for (const Contender& contender : contenders()) require_same(contender, scene);  // an engine with another model measures nothing
       for (const double duration : {1.0, 10.0, longest}) {
-        const double kinetic = run(of_order(6), scene, 1e-3, std::min(duration, kLongestFine)).kinetic;
+        const double kinetic = run(linden_of_order(6), scene, 1e-3, std::min(duration, kLongestFine)).kinetic;
         for (const Contender& contender : contenders()) {
           for (const double step : kSteps) {
             if (step == kFine && duration > kLongestFine) continue;

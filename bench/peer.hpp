@@ -67,6 +67,7 @@ struct Contender {
 /// MJCF of a model made in code. Throws std::runtime_error for what MuJoCo has no joint for.
 std::string mjcf_of(const Robot& robot);
 
+Contender linden_of_order(int order);
 std::vector<Contender> linden_contenders();
 std::vector<Contender> mujoco_contenders();
 std::vector<Contender> dart_contenders();

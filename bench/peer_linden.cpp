@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <stdexcept>
 
 #include "bench/peer.hpp"
@@ -9,7 +11,7 @@ namespace {
 
 class AlonePeer : public Peer {
  public:
-  AlonePeer(const Robot& robot, const Plan& plan) : simulation_(robot.model, {.step = plan.step, .gravity = {0, 0, -plan.gravity}}) {}
+  AlonePeer(const Robot& robot, const Plan& plan, int order = 2) : simulation_(robot.model, options(plan, order)) {}
 
   double mass() const override { return mass_distribution(simulation_.model(), simulation_.positions()).mass; }
   Index degrees_of_freedom() const override { return simulation_.model().degrees_of_freedom(); }
@@ -31,6 +33,13 @@ class AlonePeer : public Peer {
   Energy energy(std::int64_t) override { return simulation_.energy(); }
 
  private:
+  static Options options(const Plan& plan, int order) {
+    Options options{.step = plan.step, .gravity = {0, 0, -plan.gravity}};
+    options.order = order;
+    options.tolerance = default_tolerance(order);
+    return options;
+  }
+
   Simulation simulation_;
 };
 
@@ -75,6 +84,11 @@ std::unique_ptr<Peer> make(const Robot& robot, const Plan& plan) {
 }
 
 }  // namespace
+
+Contender linden_of_order(int order) {
+  return {fmt::format("linden-order-{}", order), fmt::format("linden, Simulation, order {}", order), true, false, 1e-12,
+          [order](const Robot& robot, const Plan& plan) { return std::make_unique<AlonePeer>(robot, plan, order); }};
+}
 
 std::vector<Contender> linden_contenders() {
   const std::string lanes(name(best_instructions()));

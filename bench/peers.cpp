@@ -24,7 +24,7 @@
 #include <stdexcept>
 
 #include "bench/machine.hpp"
-#include "bench/peer.hpp"
+#include "bench/installed_peers.hpp"
 #include "layout/urdf.hpp"
 
 namespace linden {
@@ -145,12 +145,7 @@ void race(benchmark::State& state, const Contender& contender, const Robot& robo
 
 std::vector<Contender> contenders() {
   std::vector<Contender> all = linden_contenders();
-#ifdef LINDEN_WITH_MUJOCO
-  std::ranges::move(mujoco_contenders(), std::back_inserter(all));
-#endif
-#ifdef LINDEN_WITH_DART
-  std::ranges::move(dart_contenders(), std::back_inserter(all));
-#endif
+  std::ranges::move(installed_peers(), std::back_inserter(all));
   return all;
 }
 

@@ -26,8 +26,9 @@
 
 #include "engine/block_stepper.hpp"
 #include "engine/convergence.hpp"
-#include "engine/effect_sweeps.hpp"
 #include "engine/instance_stepper.hpp"
+#include "engine/lane_effects.hpp"
+#include "engine/lanes_of.hpp"
 #include "kernels/advance_down.hpp"
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/innovation_up.hpp"
@@ -43,41 +44,6 @@ inline constexpr int kMostCorrections = 8;
 /// With effects, whose states may take some corrections to settle; from some on they are revised one by one.
 inline constexpr int kMostEffectCorrections = 24, kBulkEffectCorrections = 8;
 
-/// One bit a lane.
-using Lanes = std::uint32_t;
-
-template <class S>
-struct LanesOf {
-  static constexpr int count = 1;
-  using Mask = bool;
-  static S load(const S* from) { return *from; }
-  static void store(const S& value, S* to) { *to = value; }
-  static Lanes bits(bool mask) { return mask ? 1u : 0u; }
-  static bool mask(Lanes bits) { return bits != 0; }
-};
-
-template <class S>
-  requires requires { typename S::arch_type; }
-struct LanesOf<S> {
-  static constexpr int count = static_cast<int>(S::size);
-  using Real = typename S::value_type;
-  using Mask = typename S::batch_bool_type;
-  static S load(const Real* from) { return S::load_unaligned(from); }
-  static void store(const S& value, Real* to) { value.store_unaligned(to); }
-  static Lanes bits(const Mask& mask) {
-    std::array<bool, S::size> each;
-    mask.store_unaligned(each.data());
-    Lanes bits = 0;
-    for (std::size_t l = 0; l < S::size; ++l) bits |= each[l] ? 1u << l : 0u;
-    return bits;
-  }
-  static Mask mask(Lanes bits) {
-    std::array<Real, S::size> each;
-    for (std::size_t l = 0; l < S::size; ++l) each[l] = (bits >> l & 1u) != 0 ? Real(1) : Real(0);
-    return S::load_unaligned(each.data()) > S(Real(0.5));
-  }
-};
-
 template <class Pack, bool kOwnMasses>
 class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
  public:
@@ -88,12 +54,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   explicit LaneStepper(const BlockSetup<Real>& setup)
       : model_(setup.model), tree_(setup.model.tree), options_(setup.options), shared_constants_(setup.constants),
-        alone_(model_, options_, setup.plan) {
-    if (setup.plan != nullptr && setup.plan->any()) effects_ = std::make_unique<EffectSweeps<Pack>>(*setup.plan, model_);
-    if (effects_) {
-      end_.allocate(tree_.shape.velocities);
-      alone_contacts_.allocate(effects_->contacts());
-    }
+        effects_(setup), alone_(model_, options_, setup.plan) {
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     kept_.allocate(shape);
@@ -133,12 +94,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   void step(const Block<Real>& block, std::int64_t steps) override {
     load(block);
     refresh();
-    if (effects_) load_effects(block);
+    if (effects_) effects_.load(block);
     Lanes alive = 0;
     for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
     for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = effects_ ? step_with_effects(block, alive) : step_once(block, alive);
     store(block);
-    if (effects_) store_contacts(block);
+    if (effects_) effects_.store(block);
   }
 
   void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
@@ -204,23 +165,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Pack refresh() {
     advance(L::mask(0));
     const Pack potential = update_momentum(L::mask(0));
-    return effects_ ? potential + refresh_effects() : potential;
-  }
-
-  Pack refresh_effects() { return effect_potential_ = effects_->refresh(work_.placement, q_); }
-
-  void load_effects(const Block<Real>& block) {
-    const auto load = [](const Real* from, Field<Pack>& to) {
-      for (Index k = 0; from != nullptr && k < to.rows(); ++k) to(k) = L::load(from + k * W);
-    };
-    load(block.targets, effects_->servo_targets());
-    load(block.frictions, effects_->friction_forces());
-    if (block.contacts == nullptr) return;
-    for (Index k = 0; k < effects_->contacts(); ++k) effects_->set_contact(k, L::load(block.contacts + k * W));
-  }
-  void store_contacts(const Block<Real>& block) {
-    if (block.contacts == nullptr) return;
-    for (Index k = 0; k < effects_->contacts(); ++k) L::store(effects_->contact(k), block.contacts + k * W);
+    return effects_ ? potential + effects_.refresh(work_.placement, q_) : potential;
   }
 
   void advance(const Mask& moves) {
@@ -340,21 +285,6 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     return finish(block, alive, done, lost, energy);
   }
 
-  /// What effects do to an evaluation, and its factor and norm.
-  Pack act(Evaluation<Pack>& now) {
-    const EffectPlan& plan = effects_->plan();
-    if (plan.bodies) effects_->bodies(constants(), work_.displacement, work_.impulse);
-    if (plan.joints) {
-      if (plan.balls) displacement_map(tree_, work_.motion, work_.delta);
-      effects_->joints(work_.delta, work_.motion, work_.momentum_target);
-      now.energy = now.energy + armature_energy<Pack>(plan.effects.armature, work_.delta);
-    }
-    const auto& stiffness = effects_->joint_sum().stiffness;
-    const auto& pull = effects_->body_sum().pull;
-    if (plan.bodies) return newton_up<false>(tree_, constants(), work_, EffectsAdded<Pack, true, true>{stiffness, pull});
-    return newton_up<false>(tree_, constants(), work_, EffectsAdded<Pack, true, false>{stiffness, pull});
-  }
-
   /// As step_once. The factor is exact and fresh at every evaluation, so that lanes that wait for others compute what they had, and what
   /// becomes of a lane whose effects change their state depends on itself alone.
   [[gnu::noinline]] Lanes step_with_effects(const Block<Real>& block, Lanes alive) {
@@ -364,11 +294,10 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     Pack energy = number(0);
     if (active != 0) {
       first_guess(block, active);
-      if (effects_->plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects_->plain_target().flat().begin());
-      begin_effects(block);
+      effects_.begin(block, options_.step, q_, work_);
       Evaluation<Pack> now = start_down(tree_, constants(), work_);
       if (effects_->contacts() > 0) effects_->guess_points(work_.displacement, true);
-      Pack norm = act(now);
+      Pack norm = effects_.act(constants(), work_, now);
       const Pack limit = number(std::numeric_limits<Real>::max());
       const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
       for (int corrections = 0;; ++corrections) {
@@ -393,36 +322,10 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
         active &= ~(ok | given_up);
         if (active == 0) break;
         now = correct_down(tree_, constants(), L::mask(active & ~changed), work_);
-        norm = act(now);
+        norm = effects_.act(constants(), work_, now);
       }
     }
     return finish(block, alive, done, lost, energy);
-  }
-
-  void begin_effects(const Block<Real>& block) {
-    std::array<Real, W> time{};
-    Lanes known = 0;
-    for (int l = 0; l < block.count; ++l) {
-      time[static_cast<std::size_t>(l)] = static_cast<Real>((static_cast<double>(block.instances[l].steps) + 0.5) * options_.step);
-      known |= block.instances[l].displacements > 1 ? 1u << l : 0u;
-    }
-    constexpr int words = kHistoryWords<Real> * W;
-    const auto past = [&](Index row, int steps) {
-      const std::uint32_t* const from = block.past + row * words;
-      std::array<Real, W> each;
-      for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<W, Real>(from + l, steps);
-      return L::load(each.data());
-    };
-    effects_->begin(L::load(time.data()), number(options_.step), q_, past, L::mask(known), work_.delta);
-  }
-
-  /// What effects add to the end of a step, and how much they did in it.
-  Pack end_effects() {
-    const EffectWork<Pack> done = effects_->work(work_.innovation, work_.delta, work_.delta, false);
-    using std::abs;
-    Pack activity = effects_->activity(done, work_.motion, work_.delta) + effect_potential_;
-    for (Index row = 0; row < tree_.shape.velocities; ++row) activity = activity + abs(work_.force(row) * work_.delta(row));
-    return activity;
   }
 
   Lanes finish(const Block<Real>& block, Lanes alive, Lanes done, Lanes lost, const Pack& energy) {
@@ -432,33 +335,24 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     const Pack pace = L::load(block.pace), pace_work = L::load(block.pace + W);
     const Pack work_at_begin = work();
     using std::max;
-    const Pack activity = effects_ ? end_effects() : number(0);
+    const Pack activity = effects_ ? effects_.activity(work_) : number(0);
     const Lanes gains =
         L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) - activity > number(kMostGain) * max(kinetic, pace));
     lost |= done & gains;
     done &= ~lost;
 
     Lanes frozen = 0;
-    for (Pack& contact : alone_contacts_.flat()) contact = number(0);
     for (int l = 0; l < W; ++l) {
       if ((lost >> l & 1u) != 0 && !step_alone(block, l)) frozen |= 1u << l;
     }
 
     const Mask moves = L::mask(done);
-    if (effects_) {
-      if (effects_->plan().joints) effects_->end_joints(work_.delta, work_.motion, work_.innovation, end_);
-      if (effects_->plan().bodies) effects_->end_bodies(work_.placement, work_.displacement, work_.impulse);
-      for (Index k = 0; k < effects_->contacts(); ++k) {
-        effects_->set_contact(k, select(moves, effects_->contact(k), alone_contacts_(k)));
-      }
-    }
+    if (effects_) effects_.end(moves, work_);
     advance(moves);
     update_momentum(moves);
     if (effects_) {
-      if (effects_->plan().joints) {
-        for (Index row = 0; row < tree_.shape.velocities; ++row) p_(row) = select(moves, p_(row) + end_(row), p_(row));
-      }
-      refresh_effects();
+      effects_.add_end(moves, p_);
+      effects_.refresh(work_.placement, q_);
     }
     if (done == 0) return alive & ~frozen;
 
@@ -483,23 +377,11 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     return alive & ~frozen;
   }
 
-  static Real lane(const Pack& pack, int l) {
-    std::array<Real, W> each;
-    L::store(pack, each.data());
-    return each[static_cast<std::size_t>(l)];
-  }
-  static void set_lane(Pack& pack, int l, double value) {
-    std::array<Real, W> each;
-    L::store(pack, each.data());
-    each[static_cast<std::size_t>(l)] = static_cast<Real>(value);
-    pack = L::load(each.data());
-  }
-
   /// Lane l as it stands, for alone_.
   void take_out(const Block<Real>& block, int l) {
     State<double>& state = alone_.state();
     const auto take = [&](const Field<Pack>& from, std::span<double> to) {
-      for (std::size_t row = 0; row < to.size(); ++row) to[row] = static_cast<double>(lane(from(static_cast<Index>(row)), l));
+      for (std::size_t row = 0; row < to.size(); ++row) to[row] = static_cast<double>(L::lane(from(static_cast<Index>(row)), l));
     };
     take(q_, state.q.flat());
     take(p_, state.p.flat());
@@ -509,7 +391,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     if constexpr (kOwnMasses) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
       for (Index i = 0; i < inertia.rows(); ++i) {
-        for (int k = 0; k < 10; ++k) inertia(i, k) = static_cast<double>(lane(own_constants_.inertia(i, k), l));
+        for (int k = 0; k < 10; ++k) inertia(i, k) = static_cast<double>(L::lane(own_constants_.inertia(i, k), l));
       }
     }
     for (int k = 0; k < 2; ++k) state.pace(0, k) = static_cast<double>(block.pace[k * W + l]);
@@ -527,7 +409,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   /// What the next step of lane l wants to know of one taken alone: its contacts and, where it was not split, its displacement.
   void keep_alone(const Block<Real>& block, int l, bool whole) {
-    for (Index k = 0; k < alone_contacts_.rows(); ++k) set_lane(alone_contacts_(k), l, alone_.contact(k));
+    effects_.keep_alone(l, alone_);
     if (!whole) return;
     constexpr int words = kHistoryWords<Real> * W;
     std::array<std::int32_t, W> known;
@@ -559,8 +441,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     instance.steps += 1;
     for (int k = 0; k < 2; ++k) block.pace[k * W + l] = static_cast<Real>(state.pace(0, k));
     if (effects_) keep_alone(block, l, report.substeps == 1);
-    for (Index row = 0; row < q_.rows(); ++row) set_lane(q_(row), l, state.q(row));
-    for (Index row = 0; row < p_.rows(); ++row) set_lane(p_(row), l, state.p(row));
+    for (Index row = 0; row < q_.rows(); ++row) L::set_lane(q_(row), l, state.q(row));
+    for (Index row = 0; row < p_.rows(); ++row) L::set_lane(p_(row), l, state.p(row));
     return true;
   }
 
@@ -576,10 +458,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Workspace<Pack> work_;
   Kept<Pack> kept_;
   Field<Pack> q_, p_, applied_;
-  EffectsPointer<Pack> effects_;
-  Field<Pack> end_;                              // what effects add to p at the end of a step
-  Field<Pack> alone_contacts_;                   // of lanes that were stepped alone
-  Pack effect_potential_ = Pack(Real(0));
+  LaneEffects<Pack> effects_;
   InstanceStepper alone_;
 };
 

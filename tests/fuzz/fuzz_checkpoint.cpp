@@ -28,11 +28,11 @@ std::string checksum(const std::string& bytes) {
 }
 
 /// The checkpoint of a run of some steps, without its checksum.
-std::string good_checkpoint(const InputFolder& folder) {
+std::string good_checkpoint(const ScratchFolder& folder) {
   Simulation run = simulation();
   for (int k = 0; k < 3; ++k) require(run.step().ok(), "a step of the good run fails");
   run.save(folder.file("good"));
-  const std::string bytes = folder.read("good");
+  const std::string bytes = text_of(folder.file("good"));
   const std::string body = bytes.substr(0, bytes.size() - kChecksum);
   require(body + checksum(body) == bytes, "the checksum is another");
   return body;
@@ -41,7 +41,7 @@ std::string good_checkpoint(const InputFolder& folder) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
-  static const InputFolder folder;
+  static const ScratchFolder folder(input_folder());
   static const std::string good = good_checkpoint(folder);
   std::string bytes = good;
   if (size > 0) bytes.resize(bytes.size() - std::min<std::size_t>(data[0], bytes.size()));

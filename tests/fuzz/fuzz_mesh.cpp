@@ -4,7 +4,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
   using namespace linden;
-  static const InputFolder folder;
+  static const ScratchFolder folder(input_folder());
   const std::string bytes = text_of(data, size);
   for (const char* name : {"mesh.stl", "mesh.obj", "mesh.dae"}) {
     folder.write(name, bytes);

@@ -7,7 +7,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
   using namespace linden;
-  static const InputFolder folder;
+  static const ScratchFolder folder(input_folder());
   folder.write("numbers.csv", text_of(data, size));
   for (const std::size_t columns : {std::size_t{0}, std::size_t{2}}) {
     read_or_refuse([&] {

@@ -6,17 +6,15 @@
 #pragma once
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <string_view>
 
 #include "layout/input_error.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace linden {
 
@@ -42,35 +40,10 @@ void read_or_refuse(const Read& read) {
 
 inline std::string text_of(const unsigned char* data, std::size_t size) { return {reinterpret_cast<const char*>(data), size}; }
 
-/// Files for readers that take a path, gone when the fuzzer ends well.
-class InputFolder {
- public:
-  InputFolder() {
-    // in memory where there is such a folder: ten times as many runs a second
-    const std::filesystem::path memory = "/dev/shm";
-    const bool any = std::filesystem::is_directory(memory);
-    std::string name = ((any ? memory : std::filesystem::temp_directory_path()) / "linden_fuzz_XXXXXX").string();
-    require(::mkdtemp(name.data()) != nullptr, "no temporary folder");  // fills in the end
-    path_ = name;
-  }
-  ~InputFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  InputFolder(const InputFolder&) = delete;
-  InputFolder& operator=(const InputFolder&) = delete;
-
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-  void write(const std::string& name, const std::string& bytes) const {
-    require(static_cast<bool>(std::ofstream(path_ / name, std::ios::binary) << bytes), "an input file cannot be written");
-  }
-  std::string read(const std::string& name) const {
-    std::ifstream in(path_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  }
-
- private:
-  std::filesystem::path path_;
-};
+/// Where files for readers that take a path lie: in memory where there is such a folder, which is ten times as many runs a second.
+inline std::filesystem::path input_folder() {
+  const std::filesystem::path memory = "/dev/shm";
+  return std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path();
+}
 
 }  // namespace linden

@@ -9,24 +9,13 @@
 #include "tests/gallery/scenario.hpp"
 #if defined(LINDEN_WITH_MUJOCO) || defined(LINDEN_WITH_DART)
 #include "bench/apart.hpp"
-#include "bench/peer.hpp"
+#include "bench/installed_peers.hpp"
 #endif
 
 namespace linden {
 
 #if defined(LINDEN_WITH_MUJOCO) || defined(LINDEN_WITH_DART)
 namespace {
-
-std::vector<Contender> contenders() {
-  std::vector<Contender> all;
-#ifdef LINDEN_WITH_MUJOCO
-  std::ranges::move(mujoco_contenders(), std::back_inserter(all));
-#endif
-#ifdef LINDEN_WITH_DART
-  std::ranges::move(dart_contenders(), std::back_inserter(all));
-#endif
-  return all;
-}
 
 /// Bodies beyond which the others, whose mass matrices have a row for each, are not asked.
 constexpr Index kMostBodies = 1000;
@@ -69,7 +58,7 @@ std::string found_by(const Contender& contender, const Scenario& scenario, doubl
 
 void run_beside(Report& report, const Scenario& scenario, double scale) {
   if (!report.peers() || scenario.model->tree.bodies() > kMostBodies) return;
-  for (const Contender& contender : contenders()) {
+  for (const Contender& contender : installed_peers()) {
     const std::string found = apart([&] { return found_by(contender, scenario, scale); });
     report.beside(contender.description, printable(found));
   }

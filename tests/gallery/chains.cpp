@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "models/generators.hpp"
+#include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 
 namespace linden {
@@ -33,21 +34,9 @@ void fifty_links(Report& report) {
   promise_no_slope(report, rest);
 }
 
-/// Planar links of `length` and `mass(i)`, hinges about y; the first hangs from the world's origin along its x axis.
 template <class Mass>
 Model planar_chain(const std::string& name, Index links, double length, const Mass& mass) {
-  TreeBuilder builder(name);
-  for (Index i = 0; i < links; ++i) {
-    LinkSpec link;
-    link.name = fmt::format("link{}", i + 1);
-    link.joint = fmt::format("joint{}", i + 1);
-    if (i > 0) link.parent = fmt::format("link{}", i);
-    if (i > 0) link.placement.translation().x() = length;
-    link.axis = Eigen::Vector3d::UnitY();
-    link.inertia = box_inertia(mass(i), {length, 0.1 * length, 0.1 * length}, {0.5 * length, 0, 0});
-    builder.add(std::move(link));
-  }
-  return builder.build();
+  return hinged_chain(name, links, length, [&](Index i) { return rod(mass(i), length, 0.1); }, Hinges::parallel);
 }
 
 /// Angles of a planar chain whose first half goes along `direction` [rad, from x towards -z], whose middle link lies across, and

@@ -24,10 +24,11 @@ inline Model one_body(JointType type, const LinkInertia& inertia, const Eigen::V
 /// Principal moments.
 inline Eigen::Matrix3d moments(double x, double y, double z) { return Eigen::Vector3d(x, y, z).asDiagonal(); }
 
-/// Links of `length` along x on hinges about y and z in turn, the first at the world's origin; inertia(i) of link i, in its
-/// frame.
+enum class Hinges { crossed, parallel };  // about y and z in turn, or all about y
+
+/// Links of `length` along x on hinges, the first at the world's origin; inertia(i) of link i, in its frame.
 template <class Inertia>
-Model hinged_chain(const std::string& name, Index links, double length, const Inertia& inertia) {
+Model hinged_chain(const std::string& name, Index links, double length, const Inertia& inertia, Hinges hinges = Hinges::crossed) {
   TreeBuilder builder(name);
   for (Index i = 0; i < links; ++i) {
     LinkSpec link;
@@ -35,16 +36,16 @@ Model hinged_chain(const std::string& name, Index links, double length, const In
     link.joint = fmt::format("joint{}", i + 1);
     if (i > 0) link.parent = fmt::format("link{}", i);
     if (i > 0) link.placement.translation().x() = length;
-    link.axis = i % 2 == 0 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitZ();
+    link.axis = i % 2 == 0 || hinges == Hinges::parallel ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitZ();
     link.inertia = inertia(i);
     builder.add(std::move(link));
   }
   return builder.build();
 }
 
-/// A thin box of that length along x.
-inline LinkInertia rod(double mass, double length) {
-  return box_inertia(mass, {length, 0.2 * length, 0.2 * length}, {0.5 * length, 0, 0});
+/// A thin box of that length along x; `width` as a share of it.
+inline LinkInertia rod(double mass, double length, double width = 0.2) {
+  return box_inertia(mass, {length, width * length, width * length}, {0.5 * length, 0, 0});
 }
 
 }  // namespace linden

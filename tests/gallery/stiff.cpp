@@ -1,6 +1,8 @@
 // Springs, dampers, servos and ground from soft to 1e9, at steps far beyond their time constants.
 #include <cmath>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "models/generators.hpp"
 #include "tests/gallery/models.hpp"
@@ -29,62 +31,58 @@ struct Gained {
   std::string failure;
 };
 
-/// Energy of the motion from step to step, its mean speed in the middle of the way: what is read off after a step, from momenta
-/// with the push of one end in them, says nothing of a joint that a stiff thing stopped within that step. Everything here is
-/// passive, so the energy of the start, that of springs and servos included, is all there ever is.
-Gained gain(const Scenario& scenario) {
+/// energy(): of the motion, asked at the start and after every step. Everything here is passive, so the energy of the start, that of
+/// springs and servos included, is all there ever is.
+template <class EnergyNow>
+Gained gain_of(Simulation& simulation, std::int64_t steps, const EnergyNow& energy) {
   Gained gained;
+  const double start = energy().total();
+  for (std::int64_t k = 0; k < steps; ++k) {
+    const StepReport step = simulation.step();
+    if (!step.ok()) {
+      gained.failure = simulation.describe(step);
+      gained.most = std::nan("");
+      break;
+    }
+    const Energy now = energy();
+    gained.most = std::max(gained.most, now.total() - start);
+    gained.scale = std::max(gained.scale, now.kinetic);
+  }
+  return gained;
+}
+
+/// Energy of the motion from step to step, its mean speed in the middle of the way: what is read off after a step, from momenta
+/// with the push of one end in them, says nothing of a joint that a stiff thing stopped within that step.
+Gained gain(const Scenario& scenario) {
   Simulation simulation = simulation_of(scenario);
   Effects conservative;
   conservative.springs = scenario.effects.springs;
   for (const Servo& servo : scenario.effects.servos) conservative.springs.push_back({servo.row, servo.stiffness, servo.target});
   Simulation ruler(scenario.model, scenario.options, conservative);
-  const auto energy_at = [&](std::span<const double> q, std::span<const double> v) {
-    ruler.set_positions(q);
-    ruler.set_velocities(v);
+  std::vector<double> before, middle(simulation.positions().begin(), simulation.positions().end()), speed = simulation.velocities();
+  double start = 0;
+  const auto energy = [&] {
+    const std::span<const double> now = simulation.positions();
+    for (std::size_t row = 0; row < before.size(); ++row) {
+      middle[row] = 0.5 * (before[row] + now[row]);
+      speed[row] = (now[row] - before[row]) / scenario.options.step;
+    }
+    const bool first = before.empty();
+    before.assign(now.begin(), now.end());
+    ruler.set_positions(middle);
+    ruler.set_velocities(speed);
+    if (first) start = ruler.energy().total();
     return ruler.energy();
   };
-  const double start = energy_at(simulation.positions(), simulation.velocities()).total();
-  gained.scale = std::abs(start);
-  std::vector<double> before(simulation.positions().begin(), simulation.positions().end()), middle(before.size()),
-      speed(before.size());
-  for (std::int64_t k = 0; k < scenario.steps; ++k) {
-    const StepReport step = simulation.step();
-    if (!step.ok()) {
-      gained.failure = simulation.describe(step);
-      gained.most = std::nan("");
-      break;
-    }
-    for (std::size_t row = 0; row < before.size(); ++row) {
-      const double now = simulation.positions()[row];
-      middle[row] = 0.5 * (before[row] + now);
-      speed[row] = (now - before[row]) / scenario.options.step;
-      before[row] = now;
-    }
-    const Energy energy = energy_at(middle, speed);
-    gained.most = std::max(gained.most, energy.total() - start);
-    gained.scale = std::max(gained.scale, energy.kinetic);
-  }
+  Gained gained = gain_of(simulation, scenario.steps, energy);
+  gained.scale = std::max(gained.scale, std::abs(start));
   return gained;
 }
 
 /// The same of a body on the ground, whose speeds are read well.
 Gained gain_on_ground(const Scenario& scenario) {
-  Gained gained;
   Simulation simulation = simulation_of(scenario);
-  const double start = simulation.energy().total();
-  for (std::int64_t k = 0; k < scenario.steps; ++k) {
-    const StepReport step = simulation.step();
-    if (!step.ok()) {
-      gained.failure = simulation.describe(step);
-      gained.most = std::nan("");
-      break;
-    }
-    const Energy energy = simulation.energy();
-    gained.most = std::max(gained.most, energy.total() - start);
-    gained.scale = std::max(gained.scale, energy.kinetic);
-  }
-  return gained;
+  return gain_of(simulation, scenario.steps, [&] { return simulation.energy(); });
 }
 
 /// Runs the same scene with every stiffness at 1 and 10 ms; make(k) gives the effects.
