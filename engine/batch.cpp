@@ -56,14 +56,16 @@ BodyConstants<Real> rounded(const BodyConstants<double>& from, const Shape& shap
 
 template <class Real>
 std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockSetup<Real>& setup) {
-  switch (instructions) {
+  return with_or_without(setup.plan, [&](auto effects) {
+    switch (instructions) {
 #ifdef LINDEN_WIDE_LANES
-    case Instructions::avx512: return make_block_stepper<Instructions::avx512>(setup);
-    case Instructions::avx2: return make_block_stepper<Instructions::avx2>(setup);
+      case Instructions::avx512: return make_block_stepper<Instructions::avx512, effects>(setup);
+      case Instructions::avx2: return make_block_stepper<Instructions::avx2, effects>(setup);
 #endif
-    case Instructions::baseline: return make_block_stepper<Instructions::baseline>(setup);
-    default: return make_block_stepper<Instructions::scalar>(setup);
-  }
+      case Instructions::baseline: return make_block_stepper<Instructions::baseline, effects>(setup);
+      default: return make_block_stepper<Instructions::scalar, effects>(setup);
+    }
+  });
 }
 
 template <class T>
@@ -145,8 +147,8 @@ struct BatchOf<Real>::Data {
   Worker& worker() const {
     Worker& mine = workers.local();
     if (!mine.block) {
-      mine.block = make<Real>(instructions, {*model, constants, options, !mass.empty(), &plan});
-      mine.instance = std::make_unique<InstanceStepper>(*model, options, &plan);
+      mine.block = make<Real>(instructions, {*model, constants, options, !mass.empty(), plan});
+      mine.instance = std::make_unique<InstanceStepper>(*model, options, plan);
     }
     return mine;
   }

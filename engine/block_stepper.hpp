@@ -81,12 +81,13 @@ struct BlockSetup {
   const BodyConstants<Real>& constants;
   const Options& options;
   bool own_masses;  // Block::mass is given
-  const EffectPlan* plan;  // beside gravity; null: none
+  const EffectPlan& plan;  // beside gravity
 };
 
-template <Instructions>
+/// kEffects: with those of the plan.
+template <Instructions, bool kEffects>
 std::unique_ptr<BlockStepper<double>> make_block_stepper(const BlockSetup<double>& setup);
-template <Instructions>
+template <Instructions, bool kEffects>
 std::unique_ptr<BlockStepper<float>> make_block_stepper(const BlockSetup<float>& setup);
 
 /// Of single precision nothing better can be asked: rounding leaves about so much of the residual.

@@ -66,7 +66,7 @@ void Simulation::save(const std::string& file) {
                       steps_,
                       history_,
                       options_.order,
-                      count_of(stepper_.effect_memory())};
+                      count_of(stepper_->effect_memory())};
   std::string bytes(kMagic);
   append(bytes, &header, 1);
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
@@ -77,7 +77,7 @@ void Simulation::save(const std::string& file) {
     append(bytes, &rows, 1);
     append(bytes, past.history.flat().data(), past.history.flat().size());
   }
-  for (const std::span<double> numbers : stepper_.effect_memory()) append(bytes, numbers.data(), numbers.size());
+  for (const std::span<double> numbers : stepper_->effect_memory()) append(bytes, numbers.data(), numbers.size());
   const std::uint64_t sum = checksum(bytes);
   append(bytes, &sum, 1);
 
@@ -107,7 +107,7 @@ void Simulation::load(const std::string& file) {
                                  "same run",
                                  file, header.order, options_.order));
   }
-  const std::vector<std::span<double>> memory = stepper_.effect_memory();
+  const std::vector<std::span<double>> memory = stepper_->effect_memory();
   if (header.effects != count_of(memory)) {
     throw InputError(fmt::format("{}: this checkpoint was made with other effects than the simulation has, so it would not continue the "
                                  "same run; load it with the scene that it was made with",
@@ -160,7 +160,7 @@ void Simulation::load(const std::string& file) {
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);
   effect_work_ = {};
-  stepper_.refresh(state_);
+  stepper_->refresh(state_);
 }
 
 }  // namespace linden

@@ -5,6 +5,7 @@
 // An effect that the scene does not name has no entry here, no memory in the sweeps and no call in a step.
 #pragma once
 
+#include <type_traits>
 #include <vector>
 
 #include "engine/options.hpp"
@@ -44,5 +45,16 @@ struct EffectPlan {
   GroundPlan ground;                // no points without ground
   std::vector<TouchedBody> touched;  // sorted by slot
 };
+
+/// action(std::true_type) where there is any effect, else action(std::false_type). What steps is compiled for each apart, so that a step
+/// without effects is the same to the last instruction whether there are any elsewhere or not; bench/pay_as_you_go counts them beside those
+/// of a linden that has none.
+template <class Action>
+auto with_or_without([[maybe_unused]] const EffectPlan& plan, const Action& action) {
+#ifndef LINDEN_WITHOUT_EFFECTS
+  if (plan.any()) return action(std::true_type{});
+#endif
+  return action(std::false_type{});
+}
 
 }  // namespace linden

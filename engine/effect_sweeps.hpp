@@ -13,7 +13,7 @@
 
 #include <array>
 #include <cmath>
-#include <memory>
+#include <type_traits>
 
 #include "engine/effect_plan.hpp"
 #include "kernels/effects/armature.hpp"
@@ -419,14 +419,11 @@ class EffectSweeps {
   S ground_potential_ = S(0.0), ground_before_ = S(0.0);
 };
 
-/// Null where a scene has no effects. bench/pay_as_you_go compiles linden as if there were none at all, and counts.
-template <class S>
-class EffectsPointer : public std::unique_ptr<EffectSweeps<S>> {
- public:
-  using std::unique_ptr<EffectSweeps<S>>::operator=;
-#ifdef LINDEN_WITHOUT_EFFECTS
-  explicit operator bool() const noexcept { return false; }
-#endif
+/// Where a scene has none: no memory and nothing to call.
+struct NoEffects {
+  NoEffects(const EffectPlan&, const Model&) {}
 };
+template <bool kEffects, class S>
+using EffectsIf = std::conditional_t<kEffects, EffectSweeps<S>, NoEffects>;
 
 }  // namespace linden

@@ -13,7 +13,8 @@ constexpr double kExtrapolation[kHistory][kHistory] = {
 
 }  // namespace
 
-void first_guess(FirstGuess guess, const Model& model, const State<double>& state, int history, double h, TreeSweeps& sweeps) {
+template <bool kEffects>
+void first_guess(FirstGuess guess, const Model& model, const State<double>& state, int history, double h, TreeSweeps<kEffects>& sweeps) {
   Workspace<double>& work = sweeps.work();
   Field<double>& delta = work.delta;
   const Index n = model.tree.shape.velocities;
@@ -49,5 +50,7 @@ void first_guess(FirstGuess guess, const Model& model, const State<double>& stat
   // No displacement is known yet: h M^-1 (p + h/2 Q).
   sweeps.velocity_of(work.momentum_target, delta);
 }
+
+template void first_guess(FirstGuess, const Model&, const State<double>&, int, double, TreeSweeps<LINDEN_ACTING>&);
 
 }  // namespace linden

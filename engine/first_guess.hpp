@@ -9,6 +9,7 @@ namespace linden {
 
 /// Writes delta [rad, m] to the workspace of the sweeps, whose momentum_target must be that of the step. `history`: how many rows of
 /// state.history are valid. Without any the guess is what momenta and forces alone would do.
-void first_guess(FirstGuess guess, const Model& model, const State<double>& state, int history, double h, TreeSweeps& sweeps);
+template <bool kEffects>
+void first_guess(FirstGuess guess, const Model& model, const State<double>& state, int history, double h, TreeSweeps<kEffects>& sweeps);
 
 }  // namespace linden

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/mimic.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
 
-InstanceStepper::InstanceStepper(const Model& model, const Options& options, const EffectPlan* plan)
-    : model_(model), options_(options), stepper_(model, options, plan) {
+InstanceStepper::InstanceStepper(const Model& model, const Options& options, const EffectPlan& plan)
+    : model_(model), options_(options), stepper_(make_stepper(model, options, plan)) {
   state_.allocate(model.tree.shape);
   rate_.allocate(model.tree.shape.velocities);
 }
@@ -21,7 +22,7 @@ InstanceStepper::~InstanceStepper() = default;
 BodyConstants<double>& InstanceStepper::own_constants() {
   if (constants_.inertia.rows() == 0) {
     constants_ = model_.constants;
-    stepper_.use(constants_);
+    stepper_->use(constants_);
   }
   return constants_;
 }
@@ -32,28 +33,28 @@ std::span<double> InstanceStepper::applied() {
 }
 
 void InstanceStepper::refresh() {
-  stepper_.forget();
-  if (!applied_.empty()) stepper_.apply(applied_);
+  stepper_->forget();
+  if (!applied_.empty()) stepper_->apply(applied_);
   if (constants_.inertia.rows() > 0) sum_subtree_masses(model_.tree, constants_);
-  stepper_.refresh(state_);
+  stepper_->refresh(state_);
 }
 
 StepReport InstanceStepper::step(double time) {
   refresh();
   int history = 0;
-  return stepper_.step(state_, history, time, options_.step);
+  return stepper_->step(state_, history, time, options_.step);
 }
 
 void InstanceStepper::set_velocities(std::span<const double> v) {
   refresh();
   std::ranges::copy(v, rate_.flat().begin());
   spread_mimics<double>(model_.mimics, rate_);
-  stepper_.momentum_of(rate_, state_.p);
+  stepper_->momentum_of(rate_, state_.p);
 }
 
 Energy InstanceStepper::observe() {
   refresh();
-  return stepper_.energy_of(state_.p, rate_);
+  return stepper_->energy_of(state_.p, rate_);
 }
 
 void normalise_positions(const Model& model, std::span<double> q) {

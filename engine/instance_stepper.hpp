@@ -3,6 +3,7 @@
 // backtracking or splitting.
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "engine/stepper.hpp"
@@ -11,7 +12,7 @@ namespace linden {
 
 class InstanceStepper {
  public:
-  InstanceStepper(const Model& model, const Options& options, const EffectPlan* plan = nullptr);
+  InstanceStepper(const Model& model, const Options& options, const EffectPlan& plan);
   // not inline: compiled for every processor, where those that use it are compiled for one
   ~InstanceStepper();
 
@@ -23,10 +24,10 @@ class InstanceStepper {
   std::span<double> applied();
 
   /// How contact point k ended the step (EffectSweeps::contact).
-  double contact(Index k) const { return stepper_.contact(k); }
+  double contact(Index k) const { return stepper_->contact(k); }
   /// Targets of the plan's servos, to be written.
-  std::span<double> servo_targets() { return stepper_.servo_targets(); }
-  std::span<double> friction_forces() { return stepper_.friction_forces(); }
+  std::span<double> servo_targets() { return stepper_->servo_targets(); }
+  std::span<double> friction_forces() { return stepper_->friction_forces(); }
 
   /// One step of the state, from `time` on. state().pace says what is known of the step before.
   StepReport step(double time);
@@ -41,7 +42,7 @@ class InstanceStepper {
 
   const Model& model_;
   Options options_;
-  Stepper stepper_;
+  std::unique_ptr<Stepper> stepper_;
   State<double> state_;
   Field<double> rate_;
   BodyConstants<double> constants_;  // empty where the model's are meant

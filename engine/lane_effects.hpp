@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 
 #include "engine/block_stepper.hpp"
 #include "engine/effect_sweeps.hpp"
@@ -17,7 +16,6 @@
 
 namespace linden {
 
-/// False where the scene has none.
 template <class Pack>
 class LaneEffects {
  public:
@@ -26,37 +24,41 @@ class LaneEffects {
   using Mask = typename L::Mask;
   static constexpr int W = L::count;
 
-  explicit LaneEffects(const BlockSetup<Real>& setup) : tree_(setup.model.tree) {
-    if (setup.plan != nullptr && setup.plan->any()) sweeps_ = std::make_unique<EffectSweeps<Pack>>(*setup.plan, setup.model);
-    if (!sweeps_) return;
+  explicit LaneEffects(const BlockSetup<Real>& setup) : tree_(setup.model.tree), sweeps_(setup.plan, setup.model) {
     end_.allocate(tree_.shape.velocities);
-    alone_contacts_.allocate(sweeps_->contacts(), Pack(Real(0)));
+    alone_contacts_.allocate(sweeps_.contacts(), Pack(Real(0)));
   }
-  explicit operator bool() const { return static_cast<bool>(sweeps_); }
-  EffectSweeps<Pack>* operator->() const { return sweeps_.get(); }
+  EffectSweeps<Pack>* operator->() { return &sweeps_; }
 
   void load(const Block<Real>& block) {
     const auto load = [](const Real* from, Field<Pack>& to) {
       for (Index k = 0; from != nullptr && k < to.rows(); ++k) to(k) = L::load(from + k * W);
     };
-    load(block.targets, sweeps_->servo_targets());
-    load(block.frictions, sweeps_->friction_forces());
-    for (Index k = 0; block.contacts != nullptr && k < sweeps_->contacts(); ++k) {
-      sweeps_->set_contact(k, L::load(block.contacts + k * W));
+    load(block.targets, sweeps_.servo_targets());
+    load(block.frictions, sweeps_.friction_forces());
+    for (Index k = 0; block.contacts != nullptr && k < sweeps_.contacts(); ++k) {
+      sweeps_.set_contact(k, L::load(block.contacts + k * W));
     }
   }
   void store(const Block<Real>& block) const {
-    for (Index k = 0; block.contacts != nullptr && k < sweeps_->contacts(); ++k) {
-      L::store(sweeps_->contact(k), block.contacts + k * W);
+    for (Index k = 0; block.contacts != nullptr && k < sweeps_.contacts(); ++k) {
+      L::store(sweeps_.contact(k), block.contacts + k * W);
     }
   }
 
   /// Returns the potential energy of springs and ground.
-  Pack refresh(const Field<Pack, 12>& placement, const Field<Pack>& q) { return potential_ = sweeps_->refresh(placement, q); }
+  Pack refresh(const Field<Pack, 12>& placement, const Field<Pack>& q) { return potential_ = sweeps_.refresh(placement, q); }
+
+  /// action(rotors): of the mass matrix they are the only part that is an effect.
+  template <class Action>
+  void with_rotors(const Action& action) {
+    if (sweeps_.rotors().rows() == 0) return action(NothingAdded{});
+    action(EffectsAdded<Pack, true, false>{sweeps_.rotors(), sweeps_.body_sum().pull});
+  }
 
   /// After the first guess. Lanes are each at their own time.
   void begin(const Block<Real>& block, double h, const Field<Pack>& q, Workspace<Pack>& work) {
-    if (sweeps_->plan().joints) std::ranges::copy(work.momentum_target.flat(), sweeps_->plain_target().flat().begin());
+    if (sweeps_.plan().joints) std::ranges::copy(work.momentum_target.flat(), sweeps_.plain_target().flat().begin());
     std::array<Real, W> time{};
     Lanes known = 0;
     for (int l = 0; l < block.count; ++l) {
@@ -70,21 +72,21 @@ class LaneEffects {
       for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<W, Real>(from + l, steps);
       return L::load(each.data());
     };
-    sweeps_->begin(L::load(time.data()), Pack(static_cast<Real>(h)), q, past, L::mask(known), work.delta);
+    sweeps_.begin(L::load(time.data()), Pack(static_cast<Real>(h)), q, past, L::mask(known), work.delta);
   }
 
   /// What effects do to an evaluation, its exact factor, and its norm.
   template <class Element>
   Pack act(const BodyConstants<Element>& constants, Workspace<Pack>& work, Evaluation<Pack>& now) {
-    const EffectPlan& plan = sweeps_->plan();
-    if (plan.bodies) sweeps_->bodies(constants, work.displacement, work.impulse);
+    const EffectPlan& plan = sweeps_.plan();
+    if (plan.bodies) sweeps_.bodies(constants, work.displacement, work.impulse);
     if (plan.joints) {
       if (plan.balls) displacement_map(tree_, work.motion, work.delta);
-      sweeps_->joints(work.delta, work.motion, work.momentum_target);
+      sweeps_.joints(work.delta, work.motion, work.momentum_target);
       now.energy = now.energy + armature_energy<Pack>(plan.effects.armature, work.delta);
     }
-    const auto& stiffness = sweeps_->joint_sum().stiffness;
-    const auto& pull = sweeps_->body_sum().pull;
+    const auto& stiffness = sweeps_.joint_sum().stiffness;
+    const auto& pull = sweeps_.body_sum().pull;
     if (plan.bodies) return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, true>{stiffness, pull});
     return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, false>{stiffness, pull});
   }
@@ -92,8 +94,8 @@ class LaneEffects {
   /// How much they did in the step that was solved, in either direction [J].
   Pack activity(const Workspace<Pack>& work) const {
     using std::abs;
-    const EffectWork<Pack> done = sweeps_->work(work.innovation, work.delta, work.delta, false);
-    Pack sum = sweeps_->activity(done, work.motion, work.delta) + potential_;
+    const EffectWork<Pack> done = sweeps_.work(work.innovation, work.delta, work.delta, false);
+    Pack sum = sweeps_.activity(done, work.motion, work.delta) + potential_;
     for (Index row = 0; row < tree_.shape.velocities; ++row) sum = sum + abs(work.force(row) * work.delta(row));
     return sum;
   }
@@ -105,24 +107,30 @@ class LaneEffects {
 
   /// The end of a step: impulses on bodies now, those of joints by add_end once the momenta are there.
   void end(const Mask& moves, Workspace<Pack>& work) {
-    if (sweeps_->plan().joints) sweeps_->end_joints(work.delta, work.motion, work.innovation, end_);
-    if (sweeps_->plan().bodies) sweeps_->end_bodies(work.placement, work.displacement, work.impulse);
-    for (Index k = 0; k < sweeps_->contacts(); ++k) {
-      sweeps_->set_contact(k, select(moves, sweeps_->contact(k), alone_contacts_(k)));
+    if (sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, work.innovation, end_);
+    if (sweeps_.plan().bodies) sweeps_.end_bodies(work.placement, work.displacement, work.impulse);
+    for (Index k = 0; k < sweeps_.contacts(); ++k) {
+      sweeps_.set_contact(k, select(moves, sweeps_.contact(k), alone_contacts_(k)));
       alone_contacts_(k) = Pack(Real(0));
     }
   }
   void add_end(const Mask& moves, Field<Pack>& p) const {
-    if (!sweeps_->plan().joints) return;
+    if (!sweeps_.plan().joints) return;
     for (Index row = 0; row < p.rows(); ++row) p(row) = select(moves, p(row) + end_(row), p(row));
   }
 
  private:
   const Tree& tree_;
-  EffectsPointer<Pack> sweeps_;
+  EffectSweeps<Pack> sweeps_;
   Field<Pack> end_;             // what they add to p at the end of a step
   Field<Pack> alone_contacts_;  // of lanes that were stepped alone in this step; zero in others
   Pack potential_ = Pack(Real(0));
+};
+
+/// Where a scene has none.
+struct NoLaneEffects {
+  template <class Real>
+  explicit NoLaneEffects(const BlockSetup<Real>&) {}
 };
 
 }  // namespace linden

@@ -1,4 +1,5 @@
-// Compiled once for each set of instructions; CMakeLists.txt says which: LINDEN_INSTRUCTIONS names it, LINDEN_PACK(Real) is its register.
+// Compiled for each set of instructions, with effects and without; CMakeLists.txt says which: LINDEN_INSTRUCTIONS names the set,
+// LINDEN_PACK its register of Real numbers, LINDEN_ACTING is true or false.
 #include "engine/lane_stepper.hpp"
 
 #include <xsimd/xsimd.hpp>
@@ -12,18 +13,18 @@ using PackOf = LINDEN_PACK;
 template <class Real>
 std::unique_ptr<BlockStepper<Real>> make_lane_stepper(const BlockSetup<Real>& setup) {
   using Pack = PackOf<Real>;
-  if (setup.own_masses) return std::make_unique<LaneStepper<Pack, true>>(setup);
-  return std::make_unique<LaneStepper<Pack, false>>(setup);
+  if (setup.own_masses) return std::make_unique<LaneStepper<Pack, true, LINDEN_ACTING>>(setup);
+  return std::make_unique<LaneStepper<Pack, false, LINDEN_ACTING>>(setup);
 }
 
 }  // namespace
 
 template <>
-std::unique_ptr<BlockStepper<double>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS>(const BlockSetup<double>& setup) {
+std::unique_ptr<BlockStepper<double>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS, LINDEN_ACTING>(const BlockSetup<double>& setup) {
   return make_lane_stepper<double>(setup);
 }
 template <>
-std::unique_ptr<BlockStepper<float>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS>(const BlockSetup<float>& setup) {
+std::unique_ptr<BlockStepper<float>> make_block_stepper<Instructions::LINDEN_INSTRUCTIONS, LINDEN_ACTING>(const BlockSetup<float>& setup) {
   return make_lane_stepper<float>(setup);
 }
 

@@ -1,6 +1,6 @@
 // engine/lane_stepper.hpp
 // Steps of a block of W instances: lane = instance. `Pack` is a register of W numbers (or one number), `kOwnMasses` says
-// whether masses differ between instances.
+// whether masses differ between instances, `kEffects` whether anything acts beside gravity.
 //
 //   momentum_target, first guess
 //   start_down                        guess -> displacements, momenta
@@ -44,7 +44,7 @@ inline constexpr int kMostCorrections = 8;
 /// With effects, whose states may take some corrections to settle; from some on they are revised one by one.
 inline constexpr int kMostEffectCorrections = 24, kBulkEffectCorrections = 8;
 
-template <class Pack, bool kOwnMasses>
+template <class Pack, bool kOwnMasses, bool kEffects>
 class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
  public:
   using Real = typename ElementOf<Pack>::type;
@@ -94,12 +94,18 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   void step(const Block<Real>& block, std::int64_t steps) override {
     load(block);
     refresh();
-    if (effects_) effects_.load(block);
+    if constexpr (kEffects) effects_.load(block);
     Lanes alive = 0;
     for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
-    for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = effects_ ? step_with_effects(block, alive) : step_once(block, alive);
+    for (std::int64_t k = 0; k < steps && alive != 0; ++k) {
+      if constexpr (kEffects) {
+        alive = step_with_effects(block, alive);
+      } else {
+        alive = step_once(block, alive);
+      }
+    }
     store(block);
-    if (effects_) effects_.store(block);
+    if constexpr (kEffects) effects_.store(block);
   }
 
   void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
@@ -165,7 +171,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Pack refresh() {
     advance(L::mask(0));
     const Pack potential = update_momentum(L::mask(0));
-    return effects_ ? potential + effects_.refresh(work_.placement, q_) : potential;
+    if constexpr (kEffects) return potential + effects_.refresh(work_.placement, q_);
+    return potential;
   }
 
   void advance(const Mask& moves) {
@@ -183,11 +190,13 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   [[gnu::noinline]] void solve_mass(const Field<Pack>& right_side, Field<Pack>& rate) {
-    if (effects_ && effects_->rotors().rows() > 0) {
-      const EffectsAdded<Pack, true, false> rotors{effects_->rotors(), effects_->body_sum().pull};
+    const auto factor = [&](const auto& rotors) {
       articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains(), rotors);
+    };
+    if constexpr (kEffects) {
+      effects_.with_rotors(factor);
     } else {
-      articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains());
+      factor(NothingAdded{});
     }
     impulse_pass_up(tree_, constants(), work_.placement, gains(), right_side, work_.bias, work_.innovation);
     rate_down(tree_, constants(), work_.placement, gains(), work_.innovation, work_.variation, rate);
@@ -335,7 +344,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     const Pack pace = L::load(block.pace), pace_work = L::load(block.pace + W);
     const Pack work_at_begin = work();
     using std::max;
-    const Pack activity = effects_ ? effects_.activity(work_) : number(0);
+    Pack activity = number(0);
+    if constexpr (kEffects) activity = effects_.activity(work_);
     const Lanes gains =
         L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) - activity > number(kMostGain) * max(kinetic, pace));
     lost |= done & gains;
@@ -347,16 +357,17 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
 
     const Mask moves = L::mask(done);
-    if (effects_) effects_.end(moves, work_);
+    if constexpr (kEffects) effects_.end(moves, work_);
     advance(moves);
     update_momentum(moves);
-    if (effects_) {
+    if constexpr (kEffects) {
       effects_.add_end(moves, p_);
       effects_.refresh(work_.placement, q_);
     }
     if (done == 0) return alive & ~frozen;
 
-    const Pack kept = effects_ ? max(kinetic, select(pace > number(0), number(kImpactMemory) * pace, number(0))) : kinetic;
+    Pack kept = kinetic;
+    if constexpr (kEffects) kept = max(kinetic, select(pace > number(0), number(kImpactMemory) * pace, number(0)));
     L::store(select(moves, kept, L::load(block.pace)), block.pace);
     L::store(select(moves, number(0.5) * (work_at_begin + work()), L::load(block.pace + W)), block.pace + W);
     std::array<std::int32_t, W> known;
@@ -386,8 +397,10 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     take(q_, state.q.flat());
     take(p_, state.p.flat());
     if (has_applied_) take(applied_, alone_.applied());
-    if (effects_ && block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
-    if (effects_ && block.frictions != nullptr) take(effects_->friction_forces(), alone_.friction_forces());
+    if constexpr (kEffects) {
+      if (block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
+      if (block.frictions != nullptr) take(effects_->friction_forces(), alone_.friction_forces());
+    }
     if constexpr (kOwnMasses) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
       for (Index i = 0; i < inertia.rows(); ++i) {
@@ -440,7 +453,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     instance.rescued += 1;
     instance.steps += 1;
     for (int k = 0; k < 2; ++k) block.pace[k * W + l] = static_cast<Real>(state.pace(0, k));
-    if (effects_) keep_alone(block, l, report.substeps == 1);
+    if constexpr (kEffects) keep_alone(block, l, report.substeps == 1);
     for (Index row = 0; row < q_.rows(); ++row) L::set_lane(q_(row), l, state.q(row));
     for (Index row = 0; row < p_.rows(); ++row) L::set_lane(p_(row), l, state.p(row));
     return true;
@@ -458,7 +471,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Workspace<Pack> work_;
   Kept<Pack> kept_;
   Field<Pack> q_, p_, applied_;
-  LaneEffects<Pack> effects_;
+  [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;
   InstanceStepper alone_;
 };
 

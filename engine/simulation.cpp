@@ -9,6 +9,7 @@
 #include "engine/composition.hpp"
 #include "engine/instance_stepper.hpp"
 #include "engine/scene.hpp"
+#include "kernels/mimic.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
 
@@ -28,7 +29,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
     : model_(std::move(model)), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
-      stepper_(*model_, options, plan_.get()) {
+      stepper_(make_stepper(*model_, options, *plan_)) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
@@ -56,18 +57,18 @@ void Simulation::check_row_count(const char* what, std::size_t found, Index expe
 
 void Simulation::changed() {
   history_ = 0;
-  stepper_.forget();
+  stepper_->forget();
   std::ranges::fill(state_.history.flat(), 0.0);
   for (Past& past : past_) {
     past.rows = 0;
     std::ranges::fill(past.history.flat(), 0.0);
   }
   std::ranges::fill(state_.pace.flat(), std::numeric_limits<double>::quiet_NaN());
-  stepper_.refresh(state_);
+  stepper_->refresh(state_);
 }
 
 std::vector<double> Simulation::velocities() {
-  stepper_.read_velocity(state_.p, rate_);
+  stepper_->read_velocity(state_.p, rate_);
   return {rate_.flat().begin(), rate_.flat().end()};
 }
 
@@ -88,7 +89,7 @@ void Simulation::set_velocities(std::span<const double> v) {
   }
   std::ranges::copy(v, rate_.flat().begin());
   spread_mimics<double>(model_->mimics, rate_);
-  stepper_.momentum_of(rate_, state_.p);
+  stepper_->momentum_of(rate_, state_.p);
   changed();
 }
 
@@ -98,12 +99,12 @@ void Simulation::set_forces(std::span<const double> force) {
     if (std::isfinite(force[i])) continue;
     throw InputError(fmt::format("the force on {} is {}", quoted(model_->names.velocity[i]), force[i]));
   }
-  stepper_.apply(force);
-  stepper_.refresh(state_);
+  stepper_->apply(force);
+  stepper_->refresh(state_);
 }
 
 void Simulation::set_servo_targets(std::span<const double> targets) {
-  const std::span<double> to = stepper_.servo_targets();
+  const std::span<double> to = stepper_->servo_targets();
   check_row_count("servo targets", targets.size(), static_cast<Index>(to.size()));
   for (std::size_t k = 0; k < targets.size(); ++k) {
     if (!std::isfinite(targets[k])) throw InputError(fmt::format("the target of servo {} is {}", k, targets[k]));
@@ -112,7 +113,7 @@ void Simulation::set_servo_targets(std::span<const double> targets) {
 }
 
 void Simulation::set_friction(std::span<const double> forces) {
-  const std::span<double> to = stepper_.friction_forces();
+  const std::span<double> to = stepper_->friction_forces();
   check_row_count("forces of friction", forces.size(), static_cast<Index>(to.size()));
   for (std::size_t k = 0; k < forces.size(); ++k) {
     if (!std::isfinite(forces[k]) || forces[k] < 0) {
@@ -138,10 +139,10 @@ void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, cons
 }
 
 StepReport Simulation::step() {
-  const StepReport report = past_.empty() ? stepper_.step(state_, history_, time(), options_.step) : step_in_stages();
+  const StepReport report = past_.empty() ? stepper_->step(state_, history_, time(), options_.step) : step_in_stages();
   if (report.ok()) {
     ++steps_;
-    effect_work_.add(stepper_.effect_work());
+    effect_work_.add(stepper_->effect_work());
   }
   return report;
 }
@@ -155,7 +156,7 @@ StepReport Simulation::step_in_stages() {
   const std::span<const double> stages = composition(options_.order);
   for (std::size_t i = 0; i < stages.size(); ++i) {
     if (i > 0) std::swap(state_.history, past_[i - 1].history);
-    const StepReport report = stepper_.step(state_, i > 0 ? past_[i - 1].rows : history_, time(), stages[i] * options_.step);
+    const StepReport report = stepper_->step(state_, i > 0 ? past_[i - 1].rows : history_, time(), stages[i] * options_.step);
     if (i > 0) std::swap(state_.history, past_[i - 1].history);
     whole.add(report);
     if (report.ok()) continue;
@@ -169,11 +170,11 @@ StepReport Simulation::step_in_stages() {
   return whole;
 }
 
-Energy Simulation::energy() { return stepper_.energy_of(state_.p, rate_); }
+Energy Simulation::energy() { return stepper_->energy_of(state_.p, rate_); }
 
 Momentum Simulation::momentum() {
-  stepper_.read_velocity(state_.p, rate_);
-  const Wrench<double> h = stepper_.total_momentum(rate_);
+  stepper_->read_velocity(state_.p, rate_);
+  const Wrench<double> h = stepper_->total_momentum(rate_);
   return {{h.n.x, h.n.y, h.n.z}, {h.f.x, h.f.y, h.f.z}};
 }
 

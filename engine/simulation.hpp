@@ -96,7 +96,7 @@ class Simulation {
   Options options_;
   std::unique_ptr<EffectPlan> plan_;
   State<double> state_;
-  Stepper stepper_;
+  std::unique_ptr<Stepper> stepper_;
   Field<double> rate_;
   EffectWork<double> effect_work_;
   std::int64_t steps_ = 0;

@@ -5,10 +5,12 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 
 #include "engine/first_guess.hpp"
 #include "engine/stepper.hpp"
+#include "engine/tree_sweeps.hpp"
 #include "kernels/advance_map.hpp"
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/displacement_down.hpp"
@@ -50,21 +52,22 @@ double seconds_per_call(const Call& call) {
 }
 
 /// The memory of a step, and each of its sweeps by name.
+template <bool kEffects>
 class Bench {
  public:
   Bench(const Model& model, const Options& options, const EffectPlan& plan, const InitialState& start)
-      : model_(model), options_(options), stepper_(model, options, &plan), sweeps_(model, options, &plan), work_(sweeps_.work()) {
+      : model_(model), options_(options), stepper_(make_stepper(model, options, plan)), sweeps_(model, options, plan), work_(sweeps_.work()) {
     state_.allocate(model.tree.shape);
     const std::vector<double> neutral = model.neutral();
     std::ranges::copy(start.positions.empty() ? neutral : start.positions, state_.q.flat().begin());
-    stepper_.refresh(state_);
+    stepper_->refresh(state_);
     if (!start.velocities.empty()) {
       Field<double> v;
       v.allocate(model.tree.shape.velocities);
       std::ranges::copy(start.velocities, v.flat().begin());
-      stepper_.momentum_of(v, state_.p);
+      stepper_->momentum_of(v, state_.p);
     }
-    for (int k = 0; k < kSteps && stepper_.step(state_, history_, k * options.step, options.step).ok(); ++k) {
+    for (int k = 0; k < kSteps && stepper_->step(state_, history_, k * options.step, options.step).ok(); ++k) {
     }
     impulse_.allocate(model.tree.shape.slots);
     rate_.allocate(model.tree.shape.velocities);
@@ -93,10 +96,11 @@ class Bench {
     sweeps_.refresh(state_.q);
     momentum_target_map(model_.tree, options_.step, state_.p, work_.force, work_.momentum_target);
     first_guess(options_.guess, model_, state_, history_, options_.step, sweeps_);
-    if (const auto& effects = sweeps_.effects()) {
-      if (effects->plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects->plain_target().flat().begin());
+    if constexpr (kEffects) {
+      auto& effects = sweeps_.effects();
+      if (effects.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects.plain_target().flat().begin());
       const auto past = [&](Index row, int steps) { return state_.history(row, steps - 1); };
-      effects->begin(0.0, options_.step, state_.q, past, history_ >= 2, work_.delta);
+      effects.begin(0.0, options_.step, state_.q, past, history_ >= 2, work_.delta);
       sweeps_.begin(history_ > 0, 0);
     }
     sweeps_.evaluate(report);
@@ -148,15 +152,15 @@ class Bench {
       momentum_update_map(tree, constants, h, w.displacement, impulse_, sweeps_.left(), w.force, p_);
     });
     add("fold_mimics", [&] { fold_mimics(sweeps_.mimics(), p_); });
-    if (const auto& effects = sweeps_.effects()) {
-      effects->each_kernel(constants, state_.q, w, rate_, [&](const char* name, Call call) { add(name, std::move(call)); });
+    if constexpr (kEffects) {
+      sweeps_.effects().each_kernel(constants, state_.q, w, rate_, [&](const char* name, Call call) { add(name, std::move(call)); });
     }
   }
 
   const Model& model_;
   Options options_;
-  Stepper stepper_;
-  TreeSweeps sweeps_;
+  std::unique_ptr<Stepper> stepper_;
+  TreeSweeps<kEffects> sweeps_;
   Workspace<double>& work_;
   State<double> state_;
   int history_ = 0;
@@ -165,14 +169,20 @@ class Bench {
   std::map<std::string, Measured> calls_;
 };
 
+template <bool kEffects>
+std::vector<double> costs_of(const Model& model, const Options& options, const EffectPlan& plan, const InitialState& start,
+                             const std::vector<Sweep>& sweeps) {
+  Bench<kEffects> bench(model, options, plan, start);
+  std::vector<double> costs;
+  for (const Sweep& sweep : sweeps) costs.push_back(1e9 * bench.seconds(std::string(sweep.name)) / model.tree.bodies());
+  return costs;
+}
+
 }  // namespace
 
 std::vector<double> sweep_costs(const Model& model, const Options& options, const EffectPlan& plan, const InitialState& start,
                                 const std::vector<Sweep>& sweeps) {
-  Bench bench(model, options, plan, start);
-  std::vector<double> costs;
-  for (const Sweep& sweep : sweeps) costs.push_back(1e9 * bench.seconds(std::string(sweep.name)) / model.tree.bodies());
-  return costs;
+  return with_or_without(plan, [&](auto effects) { return costs_of<effects>(model, options, plan, start, sweeps); });
 }
 
 }  // namespace linden

@@ -53,22 +53,22 @@ void down_and_up(const Tree& tree, const Down& down, const Up& up) {
 
 }  // namespace
 
-bool Evaluated::usable() const { return least_w > 0 && std::isfinite(norm) && std::isfinite(plain) && std::isfinite(energy); }
-
-TreeSweeps::TreeSweeps(const Model& model, const Options& options, const EffectPlan* plan)
+template <bool kEffects>
+TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, const EffectPlan& plan)
     : model_(model),
       constants_(&model.constants),
       options_(options),
       has_gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
       one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
-      ties_(model.mimics, model.tree.shape.velocities) {
+      ties_(model.mimics, model.tree.shape.velocities),
+      effects_(plan, model) {
   work_.allocate(model.tree.shape);
-  if (plan != nullptr && plan->any()) effects_ = std::make_unique<EffectSweeps<double>>(*plan, model);
 }
 
 /// then(part) follows the forces of each part of the tree.
+template <bool kEffects>
 template <class Then>
-void TreeSweeps::refresh_and(const Field<double>& q, const Then& then) {
+void TreeSweeps<kEffects>::refresh_and(const Field<double>& q, const Then& then) {
   down_and_up(
       model_.tree,
       [&](Slots part) {
@@ -80,29 +80,34 @@ void TreeSweeps::refresh_and(const Field<double>& q, const Then& then) {
         then(part);
       });
   if (has_gravity_) potential_ = gravity_potential(work_.field, work_.first_moment);
-  if (!effects_) return;
-  effect_potential_ = effects_->refresh(work_.placement, q);
-  potential_ = (has_gravity_ ? potential_ : 0) + effect_potential_;
+  if constexpr (kEffects) {
+    effect_potential_ = effects_.refresh(work_.placement, q);
+    potential_ = (has_gravity_ ? potential_ : 0) + effect_potential_;
+  }
 }
 
-void TreeSweeps::refresh(const Field<double>& q) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::refresh(const Field<double>& q) {
   refresh_and(q, [](Slots) {});
 }
 
-void TreeSweeps::arrive(const Field<double>& q, double h, Field<double>& p) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::arrive(const Field<double>& q, double h, Field<double>& p) {
   refresh_and(q, [&](Slots part) {
     momentum_update_map(model_.tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, p);
   });
 }
 
-void TreeSweeps::apply(std::span<const double> force) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::apply(std::span<const double> force) {
   applied_.assign(force.begin(), force.end());
   if (!has_gravity_) {
     for (double& value : work_.force.flat()) value = 0;
   }
 }
 
-void TreeSweeps::forces(Slots part) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::forces(Slots part) {
   const Tree& tree = model_.tree;
   if (has_gravity_) gravity_force_up(tree, *constants_, work_.placement, work_.field, part, work_.first_moment, work_.force);
   if (applied_.empty()) return;
@@ -114,8 +119,9 @@ void TreeSweeps::forces(Slots part) {
 }
 
 /// motions(part) brings work_.motion up to date.
+template <bool kEffects>
 template <class Motions>
-Evaluated TreeSweeps::evaluate_motions(StepReport& report, bool fresh, const Motions& motions) {
+Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool fresh, const Motions& motions) {
   report.evaluations += 1;
   if (fresh) report.factorisations += 1;
   Evaluated now;
@@ -125,54 +131,63 @@ Evaluated TreeSweeps::evaluate_motions(StepReport& report, bool fresh, const Mot
     now.least_w = std::min(now.least_w, least);
     now.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
   };
-  if (one_pass_ && !effects_) {
+  if (!kEffects && one_pass_) {
     down_and_up(model_.tree, down, [&](Slots part) { now.norm += pass_part(part, fresh, NothingAdded{}); });
     now.scale = now.energy;
     return now;
   }
   in_parts_down(all_slots(model_.tree), down);
   now.scale = now.energy;
-  if (effects_) act(now);
+  act(now);
   pass_up(now, fresh);
   return now;
 }
 
 /// Effects on bodies and joints, for the displacements of an evaluation.
-void TreeSweeps::act(Evaluated& now) {
-  const EffectPlan& plan = effects_->plan();
-  if (plan.bodies) {
-    if (guess_points_) effects_->guess_points(work_.displacement, known_);
-    guess_points_ = false;
-    effects_->bodies(*constants_, work_.displacement, work_.impulse);
+template <bool kEffects>
+void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated& now) {
+  if constexpr (kEffects) {
+    const EffectPlan& plan = effects_.plan();
+    if (plan.bodies) {
+      if (guess_points_) effects_.guess_points(work_.displacement, known_);
+      guess_points_ = false;
+      effects_.bodies(*constants_, work_.displacement, work_.impulse);
+    }
+    if (plan.joints) {
+      if (plan.balls) displacement_map(model_.tree, work_.motion, work_.delta);
+      if (effects_.soft()) effects_.follow(work_.delta);
+      effects_.joints(work_.delta, work_.motion, work_.momentum_target);
+      now.energy += armature_energy<double>(plan.effects.armature, work_.delta);
+    }
+    now.scale = now.energy + effect_scale_;
   }
-  if (plan.joints) {
-    if (plan.balls) displacement_map(model_.tree, work_.motion, work_.delta);
-    if (effects_->soft()) effects_->follow(work_.delta);
-    effects_->joints(work_.delta, work_.motion, work_.momentum_target);
-    now.energy += armature_energy<double>(plan.effects.armature, work_.delta);
-  }
-  now.scale = now.energy + effect_scale_;
 }
 
 /// action(added): what effects add to a factor.
+template <bool kEffects>
 template <class Action>
-void TreeSweeps::with_added(const Action& action) {
-  if (!effects_) return action(NothingAdded{});
-  const Field<double>& stiffness = effects_->joint_sum().stiffness;
-  const Field<double, 36>& pull = effects_->body_sum().pull;
-  const EffectPlan& plan = effects_->plan();
-  if (plan.joints && plan.bodies) return action(EffectsAdded<double, true, true>{stiffness, pull});
-  if (plan.joints) return action(EffectsAdded<double, true, false>{stiffness, pull});
-  action(EffectsAdded<double, false, true>{stiffness, pull});
+void TreeSweeps<kEffects>::with_added(const Action& action) {
+  if constexpr (kEffects) {
+    const Field<double>& stiffness = effects_.joint_sum().stiffness;
+    const Field<double, 36>& pull = effects_.body_sum().pull;
+    const EffectPlan& plan = effects_.plan();
+    if (plan.joints && plan.bodies) return action(EffectsAdded<double, true, true>{stiffness, pull});
+    if (plan.joints) return action(EffectsAdded<double, true, false>{stiffness, pull});
+    action(EffectsAdded<double, false, true>{stiffness, pull});
+  } else {
+    action(NothingAdded{});
+  }
 }
 
-void TreeSweeps::begin(bool known, double scale) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::begin(bool known, double scale) {
   guess_points_ = true;
   known_ = known;
   effect_scale_ = scale;
 }
 
-void TreeSweeps::factor() {
+template <bool kEffects>
+void TreeSweeps<kEffects>::factor() {
   if (options_.solver == Solver::riqn) {
     with_added([&](const auto& added) {
       articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
@@ -191,7 +206,8 @@ void TreeSweeps::factor() {
       work_.increment);
 }
 
-void TreeSweeps::tie_rates() {
+template <bool kEffects>
+void TreeSweeps<kEffects>::tie_rates() {
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
@@ -202,15 +218,17 @@ void TreeSweeps::tie_rates() {
 }
 
 /// Residual and first half of a solve of some joints; fresh: with a factor made on the way.
+template <bool kEffects>
 template <class Added>
-double TreeSweeps::pass_part(Slots part, bool fresh, const Added& added) {
+double TreeSweeps<kEffects>::pass_part(Slots part, bool fresh, const Added& added) {
   if (fresh) {
     newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains(), added);
   }
   return innovation_up(model_.tree, *constants_, part, work_);
 }
 
-void TreeSweeps::pass_up(Evaluated& now, bool fresh) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::pass_up(Evaluated& now, bool fresh) {
   if (one_pass_) {
     now.norm = 0;
     return with_added([&](const auto& added) {
@@ -223,7 +241,8 @@ void TreeSweeps::pass_up(Evaluated& now, bool fresh) {
   now.norm = pass_residual();
 }
 
-void TreeSweeps::factor_again(Evaluated& now, StepReport& report) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::factor_again(Evaluated& now, StepReport& report) {
   report.factorisations += 1;
   if (!one_pass_) {
     factor();
@@ -231,12 +250,13 @@ void TreeSweeps::factor_again(Evaluated& now, StepReport& report) {
     return;
   }
   momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
-  if (effects_) act(now);
+  act(now);
   pass_up(now, true);
 }
 
 /// Ties between joints make the whole solve necessary for the norm.
-double TreeSweeps::pass_residual() {
+template <bool kEffects>
+double TreeSweeps<kEffects>::pass_residual() {
   const double norm =
       impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
   if (ties_.empty()) return norm;
@@ -246,7 +266,8 @@ double TreeSweeps::pass_residual() {
   return std::abs(tied);
 }
 
-void TreeSweeps::pass_down() {
+template <bool kEffects>
+void TreeSweeps<kEffects>::pass_down() {
   if (options_.solver == Solver::riqn) {
     rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, work_.increment);
   } else {
@@ -256,17 +277,20 @@ void TreeSweeps::pass_down() {
   if (!ties_.empty()) ties_.complete(work_.increment);
 }
 
-Evaluated TreeSweeps::evaluate(StepReport& report) {
+template <bool kEffects>
+Evaluated TreeSweeps<kEffects>::evaluate(StepReport& report) {
   return evaluate_motions(report, true, [&](Slots part) { motion_map(model_.tree, *constants_, work_.delta, part, work_.motion); });
 }
 
-Evaluated TreeSweeps::correct(double factor, StepReport& report) {
+template <bool kEffects>
+Evaluated TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
   return evaluate_motions(report, false, [&](Slots part) {
     correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
   });
 }
 
-Evaluated TreeSweeps::solve_and_correct(StepReport& report) {
+template <bool kEffects>
+Evaluated TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
   report.iterations += 1;
   if (!one_pass_) {
     if (ties_.empty()) pass_down();  // with ties, pass_up has solved already
@@ -280,7 +304,8 @@ Evaluated TreeSweeps::solve_and_correct(StepReport& report) {
   });
 }
 
-double TreeSweeps::slope_along(const Field<double>& innovation_before) const {
+template <bool kEffects>
+double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before) const {
   double sum = 0;
   up(model_.tree, [&](auto joint, Index i) {
     const Index row = model_.tree.first_v(i);
@@ -291,52 +316,68 @@ double TreeSweeps::slope_along(const Field<double>& innovation_before) const {
   return sum;
 }
 
-bool TreeSweeps::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) const {
+template <bool kEffects>
+bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) const {
   if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
   const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
   const double unit = epsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;
 }
 
-void TreeSweeps::factor_mass() {
-  if (effects_ && effects_->rotors().rows() > 0) {
-    const EffectsAdded<double, true, false> rotors{effects_->rotors(), effects_->body_sum().pull};
-    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), rotors);
-  } else {
-    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains());
+/// action(rotors): of the mass matrix they are the only part that is an effect.
+template <bool kEffects>
+template <class Action>
+void TreeSweeps<kEffects>::with_rotors(const Action& action) {
+  if constexpr (kEffects) {
+    if (effects_.rotors().rows() > 0) return action(EffectsAdded<double, true, false>{effects_.rotors(), effects_.body_sum().pull});
   }
+  action(NothingAdded{});
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::factor_mass() {
+  with_rotors([&](const auto& rotors) {
+    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), rotors);
+  });
   tie_rates();
 }
 
-void TreeSweeps::apply_mass_inverse(const Field<double>& p, Field<double>& v) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v) {
   impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), p, work_.bias, work_.innovation);
   rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, v);
   if (!ties_.empty()) ties_.complete(v);
 }
 
-void TreeSweeps::velocity_of(const Field<double>& p, Field<double>& v) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::velocity_of(const Field<double>& p, Field<double>& v) {
   factor_mass();
   apply_mass_inverse(p, v);
 }
 
-void TreeSweeps::momentum_of(const Field<double>& v, Field<double>& p) {
+template <bool kEffects>
+void TreeSweeps<kEffects>::momentum_of(const Field<double>& v, Field<double>& p) {
   velocity_down(model_.tree, *constants_, work_.placement, v, work_.twist);
   momentum_of_map(model_.tree, *constants_, work_.twist, work_.impulse);
   impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, p);
-  if (effects_) add_armature<double>(effects_->plan().effects.armature, v, p);
+  if constexpr (kEffects) add_armature<double>(effects_.plan().effects.armature, v, p);
   fold_mimics(ties_.mimics(), p);
 }
 
-const Field<double>& TreeSweeps::read_velocity(const Field<double>& p, Field<double>& v) {
-  if (!effects_) {
+template <bool kEffects>
+const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p, Field<double>& v) {
+  if constexpr (kEffects) {
+    read_ = p;
+    effects_.even_out(*constants_, work_.placement, work_.impulse, work_.increment, read_);
+    fold_mimics(ties_.mimics(), read_);
+    velocity_of(read_, v);
+    return read_;
+  } else {
     velocity_of(p, v);
     return p;
   }
-  read_ = p;
-  effects_->even_out(*constants_, work_.placement, work_.impulse, work_.increment, read_);
-  fold_mimics(ties_.mimics(), read_);
-  velocity_of(read_, v);
-  return read_;
 }
+
+template class TreeSweeps<LINDEN_ACTING>;
 
 }  // namespace linden

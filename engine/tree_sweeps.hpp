@@ -12,6 +12,7 @@
 // down and up before the next. What an evaluation finds where a body turned too far is not usable.
 #pragma once
 
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -30,21 +31,22 @@ struct Evaluated {
   double plain = 0;    // |h r|^2
   double norm = 0;     // squared energy norm of the residual
   double scale = 0;    // what a residual is compared with: energy, with effects also what gravity gives in a step
-  bool usable() const;
+  bool usable() const { return least_w > 0 && std::isfinite(norm) && std::isfinite(plain) && std::isfinite(energy); }
 };
 
+/// kEffects: with those of the plan, beside gravity.
+template <bool kEffects>
 class TreeSweeps {
  public:
-  /// plan: the effects beside gravity, which must outlive the sweeps; null: none.
-  TreeSweeps(const Model& model, const Options& options, const EffectPlan* plan);
+  /// The plan must outlive the sweeps.
+  TreeSweeps(const Model& model, const Options& options, const EffectPlan& plan);
 
   Workspace<double>& work() { return work_; }
   const Workspace<double>& work() const { return work_; }
   const BodyConstants<double>& constants() const { return *constants_; }
   std::span<const Mimic> mimics() const { return ties_.mimics(); }
-  /// Null where a scene has none.
-  EffectsPointer<double>& effects() { return effects_; }
-  const EffectsPointer<double>& effects() const { return effects_; }
+  EffectsIf<kEffects, double>& effects() { return effects_; }
+  const EffectsIf<kEffects, double>& effects() const { return effects_; }
 
   /// Placements, forces and potentials at q.
   void refresh(const Field<double>& q);
@@ -94,6 +96,8 @@ class TreeSweeps {
   template <class Action>
   void with_added(const Action& action);
   void act(Evaluated& now);
+  template <class Action>
+  void with_rotors(const Action& action);
   void forces(Slots part);
   void pass_up(Evaluated& now, bool fresh);
   void factor();
@@ -116,7 +120,7 @@ class TreeSweeps {
   std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;
-  EffectsPointer<double> effects_;
+  [[no_unique_address]] EffectsIf<kEffects, double> effects_;
   Field<double> read_;  // see read_velocity
 };
 

@@ -466,6 +466,37 @@ TEST_CASE("instances of a batch have joint friction of their own", "[effects][ba
   CHECK_THROWS_AS(simulation.set_friction(std::vector<double>{}), InputError);
 }
 
+TEST_CASE("what is an instance's own stays its own where it is stepped alone", "[effects][batch]") {
+  // a model with mimic joints is: every step of every instance
+  const std::shared_ptr<const Model> hand = std::make_shared<const Model>(load_urdf(model_file("hand.urdf"), Base::fixed));
+  Effects effects;
+  effects.friction = {{.row = 0, .force = 0.1}};
+  effects.servos = {{.row = 1, .stiffness = 0.5, .damping = 0.01, .target = 0}};
+  BatchOptions options;
+  Batch batch(hand, 5, options, effects);
+  const auto friction = [](std::int64_t i) { return 2e-3 * static_cast<double>(i); };
+  const auto target = [](std::int64_t i) { return 0.1 * static_cast<double>(i); };
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    batch.friction()(i, 0) = friction(i);
+    batch.servo_targets()(i, 0) = target(i);
+  }
+  constexpr int kSteps = 50;
+  batch.step(kSteps);
+  CHECK(batch.summary().rescued == kSteps * batch.size());
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    Simulation simulation(hand, options, effects);
+    simulation.set_friction(std::vector<double>{friction(i)});
+    simulation.set_servo_targets(std::vector<double>{target(i)});
+    run(simulation, kSteps);
+    for (std::size_t row = 0; row < simulation.positions().size(); ++row) {
+      INFO("instance " << i << ", " << hand->names.position[row]);
+      CHECK(batch.positions()(i, static_cast<Index>(row)) == Approx(simulation.positions()[row]).margin(1e-7));
+    }
+    if (i == 0) continue;
+    for (const Index row : {0, 1}) CHECK(std::abs(batch.positions()(i, row) - batch.positions()(i - 1, row)) > 1e-4);
+  }
+}
+
 TEST_CASE("every effect moves an instance of a batch as it moves a simulation, in single precision nearly", "[effects][batch]") {
   const Model model = ball_chain(2);
   const std::shared_ptr<const Model> chained = std::make_shared<const Model>(chain(4));
