@@ -20,8 +20,8 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "engine/accuracy_report.hpp"
-#include "engine/baseline.hpp"
+#include "engine/program/accuracy_report.hpp"
+#include "engine/step/baseline.hpp"
 #include "layout/urdf.hpp"
 #include "models/generators.hpp"
 #include "tests/reference/closed_forms.hpp"

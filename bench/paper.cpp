@@ -28,10 +28,10 @@
 
 #include "bench/comparators/integrator.hpp"
 #include "bench/machine.hpp"
-#include "engine/baseline.hpp"
-#include "engine/output_file.hpp"
-#include "engine/plot.hpp"
+#include "engine/files/output_file.hpp"
+#include "engine/program/plot.hpp"
 #include "engine/simulation.hpp"
+#include "engine/step/baseline.hpp"
 #include "models/generators.hpp"
 #include "models/random.hpp"
 

@@ -23,8 +23,8 @@
 #include <map>
 #include <stdexcept>
 
-#include "bench/machine.hpp"
 #include "bench/installed_peers.hpp"
+#include "bench/machine.hpp"
 #include "layout/urdf.hpp"
 
 namespace linden {

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <thread>
 
-#include "engine/instance_stepper.hpp"
+#include "engine/step/instance_stepper.hpp"
 #include "layout/input_error.hpp"
 #include "layout/packed_history.hpp"
 

@@ -28,7 +28,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "engine/block_stepper.hpp"
+#include "engine/step/block_stepper.hpp"
 #include "layout/effects.hpp"
 
 namespace linden {

@@ -15,7 +15,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "engine/output_file.hpp"
+#include "engine/files/output_file.hpp"
 #include "engine/simulation.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"

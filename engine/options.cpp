@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "engine/composition.hpp"
+#include "engine/step/composition.hpp"
 #include "layout/input_error.hpp"
 
 namespace linden {

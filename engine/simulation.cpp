@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/composition.hpp"
-#include "engine/instance_stepper.hpp"
-#include "engine/scene.hpp"
+#include "engine/scene/scene.hpp"
+#include "engine/step/composition.hpp"
+#include "engine/step/instance_stepper.hpp"
 #include "kernels/mimic.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/stepper.hpp"
+#include "engine/step/stepper.hpp"
 #include "layout/effects.hpp"
 
 namespace linden {
@@ -34,7 +34,7 @@ class Simulation {
   /// At rest in the model's zero configuration. Throws InputError for options and effects that make no sense.
   explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
   explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
-  /// At the start of the scene (engine/scene.hpp).
+  /// At the start of the scene (engine/scene/scene.hpp).
   explicit Simulation(const Scene& scene);
 
   const Model& model() const { return *model_; }

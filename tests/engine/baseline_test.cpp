@@ -2,7 +2,7 @@
 // steps.
 #include <cmath>
 
-#include "engine/baseline.hpp"
+#include "engine/step/baseline.hpp"
 #include "layout/input_error.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"

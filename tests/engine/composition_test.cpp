@@ -4,8 +4,8 @@
 #include <numeric>
 
 #include "engine/batch.hpp"
-#include "engine/composition.hpp"
-#include "engine/scene_file.hpp"
+#include "engine/scene/scene_file.hpp"
+#include "engine/step/composition.hpp"
 #include "layout/input_error.hpp"
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"

@@ -5,7 +5,7 @@
 
 #include "engine/batch.hpp"
 #include "engine/drift.hpp"
-#include "engine/scene_file.hpp"
+#include "engine/scene/scene_file.hpp"
 #include "folder.hpp"
 #include "models/generators.hpp"
 #include "scenes.hpp"

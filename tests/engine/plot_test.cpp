@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/plot.hpp"
+#include "engine/program/plot.hpp"
+#include "engine/program/plot_scale.hpp"
 #include "tests/engine/folder.hpp"
-#include "engine/plot_scale.hpp"
 
 namespace linden {
 namespace {

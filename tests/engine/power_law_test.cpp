@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "engine/power_law.hpp"
+#include "engine/program/power_law.hpp"
 
 namespace linden {
 namespace {

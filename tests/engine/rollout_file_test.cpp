@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/rollout_file.hpp"
+#include "engine/files/rollout_file.hpp"
 #include "tests/engine/folder.hpp"
 
 namespace linden {

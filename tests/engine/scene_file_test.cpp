@@ -1,11 +1,11 @@
-#include "engine/scene_file.hpp"
+#include "engine/scene/scene_file.hpp"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "engine/scene_yaml.hpp"
+#include "engine/scene/scene_yaml.hpp"
 #include "engine/simulation.hpp"
 #include "layout/urdf.hpp"
 #include "models/generators.hpp"

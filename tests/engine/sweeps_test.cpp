@@ -4,9 +4,9 @@
 #include <set>
 #include <string>
 
-#include "engine/effect_plan.hpp"
-#include "engine/sweep_cost.hpp"
-#include "engine/sweeps.hpp"
+#include "engine/step/effect_plan.hpp"
+#include "engine/step/sweep_cost.hpp"
+#include "engine/step/sweeps.hpp"
 #include "models/generators.hpp"
 
 namespace linden {

@@ -1,5 +1,5 @@
 // One large tree, branch by branch.
-#include "engine/tree_sweeps.hpp"
+#include "engine/step/tree_sweeps.hpp"
 
 #include <fmt/format.h>
 

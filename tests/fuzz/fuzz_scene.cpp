@@ -2,7 +2,7 @@
 // Its folder is tests/fuzz/files, where there are a robot, a mesh and tables to name.
 #include <regex>
 
-#include "engine/scene_file.hpp"
+#include "engine/scene/scene_file.hpp"
 #include "engine/simulation.hpp"
 #include "tests/fuzz/sound_model.hpp"
 

@@ -10,8 +10,8 @@
 #include <cstdio>
 #include <iterator>
 
-#include "engine/output_file.hpp"
-#include "engine/progress.hpp"
+#include "engine/files/output_file.hpp"
+#include "engine/program/progress.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/progress.hpp"
+#include "engine/program/progress.hpp"
 #include "models/generators.hpp"
 #include "tests/gallery/scenario.hpp"
 

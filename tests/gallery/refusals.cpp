@@ -1,8 +1,8 @@
 // What no engine could simulate: refused at load, in one sentence that says what is wrong and what to do.
 #include <cmath>
 
-#include "engine/scene.hpp"
-#include "engine/scene_file.hpp"
+#include "engine/scene/scene.hpp"
+#include "engine/scene/scene_file.hpp"
 #include "layout/input_error.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"

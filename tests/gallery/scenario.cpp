@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "engine/progress.hpp"
+#include "engine/program/progress.hpp"
 #include "engine/text.hpp"
 #include "kernels/placement_map.hpp"
 #include "kernels/velocity_down.hpp"

@@ -1,0 +1,42 @@
+// engine/files/array_file.hpp
+// Files of named arrays: arrays of numbers, which grow along their first axis a row at a time, and lists of words. They appear when they
+// are committed, whole or not at all; memory does not grow with the rows. Equal content makes equal bytes: no time of day is in it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace linden {
+
+enum class ElementType : std::uint8_t { float32, float64, uint8 };
+
+/// All functions throw std::runtime_error: `FILE: cannot be written: reason`. After that, as after commit, nothing but the destructor may
+/// be called.
+class ArrayFile {
+ public:
+  ArrayFile() = default;
+  /// What was not committed is deleted.
+  virtual ~ArrayFile() = default;
+  ArrayFile(const ArrayFile&) = delete;
+  ArrayFile& operator=(const ArrayFile&) = delete;
+
+  /// An array [rows, row...] that has no rows yet.
+  virtual void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) = 0;
+  /// An array [words]. Words are UTF-8.
+  virtual void add_words(const std::string& name, std::span<const std::string> words) = 0;
+  /// One row of the array that was added as number `array`, counted from 0, words not counted.
+  virtual void append(std::size_t array, const void* row) = 0;
+  virtual void commit() = 0;
+};
+
+/// For numpy.load: a zip of .npy files, not compressed. The arrays are gathered in a file each and copied at the commit, which for that
+/// time takes twice the space.
+std::unique_ptr<ArrayFile> npz_file(const std::string& file);
+
+/// For h5py.File: HDF5, every array a chunked dataset, written where it stays.
+std::unique_ptr<ArrayFile> h5_file(const std::string& file);
+
+}  // namespace linden

@@ -1,0 +1,184 @@
+// Numbers are datasets in chunks of about one row, without filters; words are strings of fixed length, padded with zeros.
+#include <hdf5.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/files/array_file.hpp"
+#include "engine/files/h5_disk.hpp"
+#include "engine/files/temporary_folder.hpp"
+
+namespace linden {
+namespace {
+
+// bytes of a chunk: every chunk takes a place in an index and a trip to the disk, and is read whole even where a part is asked for
+constexpr hsize_t kSmallestChunk = 1 << 16, kLargestChunk = 1 << 21;
+
+/// Unless told not to, HDF5 prints its errors; what it is told holds for the thread.
+void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+/// A number that HDF5 gave for something of its own.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+
+  Handle(hid_t id, Close closing) : id_(id), close_(closing) {}
+  ~Handle() { close(); }
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+  Handle& operator=(Handle&&) = delete;
+
+  hid_t id() const { return id_; }
+  herr_t close() {
+    silence();
+    const hid_t id = std::exchange(id_, H5I_INVALID_HID);
+    return id < 0 ? 0 : close_(id);
+  }
+
+ private:
+  hid_t id_;
+  Close close_;
+};
+
+/// What went wrong first in the call that failed.
+std::string first_error() {
+  std::string text = "HDF5 failed";
+  const auto keep_first = [](unsigned depth, const H5E_error2_t* error, void* into) -> herr_t {
+    if (depth == 0 && error->desc) *static_cast<std::string*>(into) = error->desc;
+    return 0;
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
+  return text;
+}
+
+/// [rows, row...] of about one row.
+std::vector<hsize_t> chunk_of(std::span<const hsize_t> row, hsize_t element) {
+  std::vector<hsize_t> chunk{1};
+  hsize_t bytes = element;
+  for (const hsize_t size : row) {
+    chunk.push_back(std::max<hsize_t>(size, 1));
+    bytes *= chunk.back();
+  }
+  if (bytes < kSmallestChunk) chunk[0] = (kSmallestChunk + bytes - 1) / bytes;
+  for (std::size_t axis = 1; axis < chunk.size() && bytes > kLargestChunk; ++axis) {
+    const hsize_t whole = chunk[axis], parts = std::min(whole, (bytes + kLargestChunk - 1) / kLargestChunk);
+    chunk[axis] = (whole + parts - 1) / parts;
+    bytes = bytes / whole * chunk[axis];
+  }
+  return chunk;
+}
+
+class H5File final : public ArrayFile {
+ public:
+  explicit H5File(const std::string& file) : folder_(file), disk_(folder_.file(kWhole)), file_(create()) {}
+
+  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) override {
+    const std::pair<hid_t, hid_t> types[] = {{H5T_IEEE_F32LE, H5T_NATIVE_FLOAT},
+                                             {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE},
+                                             {H5T_STD_U8LE, H5T_NATIVE_UINT8}};
+    const auto [stored, native] = types[static_cast<std::size_t>(type)];
+    const std::vector<hsize_t> one_row(row.begin(), row.end());
+    std::vector<hsize_t> now{0}, most{H5S_UNLIMITED};
+    for (const hsize_t size : one_row) {
+      now.push_back(size);
+      most.push_back(size > 0 ? size : H5S_UNLIMITED);  // no chunk is longer than an axis that cannot grow
+    }
+    const Handle space = own(H5Sclose, H5Screate_simple, static_cast<int>(now.size()), now.data(), most.data());
+    const Handle creation = without_times();
+    const std::vector<hsize_t> chunk = chunk_of(one_row, H5Tget_size(native));
+    call(H5Pset_chunk, creation.id(), static_cast<int>(chunk.size()), chunk.data());
+    arrays_.push_back({create(name, stored, space, creation),
+                       own(H5Sclose, H5Screate_simple, static_cast<int>(now.size()) - 1, now.data() + 1, nullptr), native, now});
+  }
+
+  void add_words(const std::string& name, std::span<const std::string> words) override {
+    std::size_t longest = 1;
+    for (const std::string& word : words) longest = std::max(longest, word.size());
+    std::string cells;
+    for (const std::string& word : words) cells.append(word).append(longest - word.size(), '\0');
+    const Handle type = own(H5Tclose, H5Tcopy, H5T_C_S1);
+    call(H5Tset_size, type.id(), longest);
+    call(H5Tset_cset, type.id(), H5T_CSET_UTF8);
+    call(H5Tset_strpad, type.id(), H5T_STR_NULLPAD);
+    const hsize_t count = words.size();
+    const Handle space = own(H5Sclose, H5Screate_simple, 1, &count, nullptr);
+    Handle dataset = create(name, type.id(), space, without_times());
+    call(H5Dwrite, dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, cells.data());
+    finish(dataset);
+  }
+
+  void append(std::size_t array, const void* row) override {
+    Array& to = arrays_[array];
+    std::vector<hsize_t> start(to.shape.size(), 0), count = to.shape;
+    start[0] = std::exchange(to.shape[0], to.shape[0] + 1);
+    count[0] = 1;
+    call(H5Dset_extent, to.dataset.id(), to.shape.data());
+    const Handle place = own(H5Sclose, H5Dget_space, to.dataset.id());
+    call(H5Sselect_hyperslab, place.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+    call(H5Dwrite, to.dataset.id(), to.type, to.row.id(), place.id(), H5P_DEFAULT, row);
+  }
+
+  void commit() override {
+    for (Array& array : arrays_) finish(array.dataset);
+    finish(file_);
+    disk_.close();
+    require(true);
+    folder_.publish(kWhole);
+  }
+
+ private:
+  struct Array {
+    Handle dataset, row;         // row: one row in memory
+    hid_t type;                  // in memory
+    std::vector<hsize_t> shape;  // [rows, row...]
+  };
+  static constexpr const char* kWhole = "whole.h5";
+
+  /// HDF5's functions that return an error ...
+  template <class Function, class... Arguments>
+  void call(Function function, Arguments... arguments) const {
+    silence();
+    require(function(arguments...) >= 0);
+  }
+
+  /// ... and those that return a handle.
+  template <class Function, class... Arguments>
+  Handle own(Handle::Close close, Function function, Arguments... arguments) const {
+    silence();
+    Handle handle(function(arguments...), close);
+    require(handle.id() >= 0);
+    return handle;
+  }
+
+  void finish(Handle& handle) const { require(handle.close() >= 0); }
+
+  void require(bool done) const {
+    if (disk_.error() != 0) cannot_be_written(folder_.target(), disk_.error());
+    if (!done) cannot_be_written(folder_.target(), first_error());
+  }
+
+  Handle create() {
+    const Handle access = own(H5Pclose, [this] { return disk_.access(); });
+    return own(H5Fclose, H5Fcreate, kWhole, H5F_ACC_TRUNC, H5P_DEFAULT, access.id());
+  }
+
+  Handle create(const std::string& name, hid_t type, const Handle& space, const Handle& creation) const {
+    return own(H5Dclose, H5Dcreate2, file_.id(), name.c_str(), type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT);
+  }
+
+  Handle without_times() const {
+    Handle creation = own(H5Pclose, H5Pcreate, H5P_DATASET_CREATE);
+    call(H5Pset_obj_track_times, creation.id(), false);
+    return creation;
+  }
+
+  TemporaryFolder folder_;
+  H5Disk disk_;
+  Handle file_;
+  std::vector<Array> arrays_;
+};
+
+}  // namespace
+
+std::unique_ptr<ArrayFile> h5_file(const std::string& file) { return std::make_unique<H5File>(file); }
+
+}  // namespace linden

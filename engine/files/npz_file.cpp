@@ -1,0 +1,182 @@
+// The .npy format, version 1.0: "\x93NUMPY", 1, 0, length of what follows (uint16, little endian), a Python dictionary of type, order and
+// shape, padded with blanks to 64 bytes, then the numbers. Source: numpy.lib.format. Room is kept for the most rows there can be.
+#include <fmt/format.h>
+#include <zip.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <string_view>
+#include <utility>
+
+#include "engine/files/array_file.hpp"
+#include "engine/files/temporary_folder.hpp"
+
+namespace linden {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory, their types say little endian");
+
+constexpr std::uint16_t kFirstDay = 1 << 5 | 1;  // 1 January 1980, the first date a zip can hold: numpy.savez writes it too
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+struct DiscardZip {
+  void operator()(zip_t* zip) const { zip_discard(zip); }
+};
+
+std::string npy_header(std::string_view type, std::int64_t rows, const std::vector<std::int64_t>& row) {
+  const auto dictionary = [&](std::int64_t first) {
+    const std::string rest = row.empty() ? "" : fmt::format(" {}", fmt::join(row, ", "));
+    return fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({},{}), }}", type, first, rest);
+  };
+  constexpr std::size_t kBefore = 10, kUnit = 64;
+  const std::size_t longest = kBefore + dictionary(std::numeric_limits<std::int64_t>::max()).size() + 1;
+  const std::size_t length = (longest + kUnit - 1) / kUnit * kUnit - kBefore;
+  std::string header("\x93NUMPY\1\0", 8);
+  header += {static_cast<char>(length & 0xff), static_cast<char>(length >> 8)};
+  return header + fmt::format("{:<{}}\n", dictionary(rows), length - 1);
+}
+
+/// Bytes that are no UTF-8 become U+FFFD.
+std::u32string code_points(std::string_view utf8) {
+  constexpr char32_t kReplacement = 0xfffd, kLast = 0x10ffff;
+  constexpr char32_t kSmallest[] = {0, 0, 0x80, 0x800, 0x10000};  // that takes so many bytes
+  std::u32string points;
+  while (!utf8.empty()) {
+    const auto first = static_cast<unsigned char>(utf8[0]);
+    const int ones = std::countl_one(first);
+    const std::size_t length = ones == 0 ? 1 : static_cast<std::size_t>(ones);
+    char32_t point = ones == 0 ? first : first & (0x7fu >> ones);
+    bool good = ones != 1 && length <= 4 && length <= utf8.size();
+    for (std::size_t k = 1; good && k < length; ++k) {
+      const auto next = static_cast<unsigned char>(utf8[k]);
+      good = next >> 6 == 2;
+      point = point << 6 | (next & 0x3fu);
+    }
+    good = good && point >= kSmallest[length] && point <= kLast && point >> 11 != 0x1b;  // 0xd800 to 0xdfff are halves of characters
+    points.push_back(good ? point : kReplacement);
+    utf8.remove_prefix(good ? length : 1);
+  }
+  return points;
+}
+
+class NpzFile final : public ArrayFile {
+ public:
+  explicit NpzFile(const std::string& file) : folder_(file) {}
+
+  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) override {
+    constexpr std::pair<const char*, std::int64_t> kTypes[] = {{"<f4", 4}, {"<f8", 8}, {"|u1", 1}};
+    const auto [code, size] = kTypes[static_cast<std::size_t>(type)];
+    const std::int64_t bytes = std::accumulate(row.begin(), row.end(), size, std::multiplies<>());
+    numbers_.push_back(arrays_.size());
+    begin({.name = name, .type = code, .row = std::move(row), .row_bytes = static_cast<std::size_t>(bytes)});
+  }
+
+  void add_words(const std::string& name, std::span<const std::string> words) override {
+    std::vector<std::u32string> decoded(words.size());
+    std::ranges::transform(words, decoded.begin(), code_points);
+    std::size_t longest = 1;
+    for (const std::u32string& word : decoded) longest = std::max(longest, word.size());
+    begin({.name = name, .type = fmt::format("<U{}", longest), .row = {}, .row_bytes = longest * sizeof(char32_t)});
+    for (std::u32string& word : decoded) {
+      word.resize(longest);
+      add_row(arrays_.back(), word.data());
+    }
+  }
+
+  void append(std::size_t array, const void* row) override { add_row(arrays_[numbers_[array]], row); }
+
+  void commit() override {
+    for (Array& array : arrays_) finish(array);
+    assemble();
+    folder_.publish(kWhole);
+  }
+
+ private:
+  struct Array {
+    std::string name, type;
+    std::vector<std::int64_t> row;  // shape
+    std::size_t row_bytes;
+    std::int64_t rows = 0;
+    std::unique_ptr<std::FILE, CloseFile> out = nullptr;
+
+    std::string file() const { return name + ".npy"; }
+    std::string header() const { return npy_header(type, rows, row); }
+  };
+  static constexpr const char* kWhole = "whole.npz";
+
+  void begin(Array array) {
+    array.out.reset(std::fopen(folder_.file(array.file()).c_str(), "wbx"));
+    if (!array.out) cannot_be_written(folder_.target(), errno);
+    const std::string header = array.header();
+    write(array, header.data(), header.size());
+    arrays_.push_back(std::move(array));
+  }
+
+  void add_row(Array& array, const void* row) {
+    write(array, row, array.row_bytes);
+    array.rows += 1;
+  }
+
+  void write(Array& array, const void* bytes, std::size_t count) {
+    errno = 0;
+    if (count > 0 && std::fwrite(bytes, 1, count, array.out.get()) != count) cannot_be_written(folder_.target(), errno);
+  }
+
+  /// The header again, now that the rows are counted.
+  void finish(Array& array) {
+    errno = 0;
+    if (std::fseek(array.out.get(), 0, SEEK_SET) != 0) cannot_be_written(folder_.target(), errno);
+    const std::string header = array.header();
+    write(array, header.data(), header.size());
+    if (std::fclose(array.out.release()) != 0) cannot_be_written(folder_.target(), errno);
+  }
+
+  void assemble() {
+    int code = 0;
+    std::unique_ptr<zip_t, DiscardZip> zip(zip_open(folder_.file(kWhole).c_str(), ZIP_CREATE | ZIP_EXCL, &code));
+    if (!zip) {
+      zip_error_t error;
+      zip_error_init_with_code(&error, code);
+      fail(error);
+    }
+    for (const Array& array : arrays_) {
+      zip_source_t* const source = zip_source_file(zip.get(), folder_.file(array.file()).c_str(), 0, -1);
+      if (!source) fail(*zip_get_error(zip.get()));
+      const zip_int64_t added = zip_file_add(zip.get(), array.file().c_str(), source, 0);
+      if (added < 0) {
+        zip_source_free(source);
+        fail(*zip_get_error(zip.get()));
+      }
+      const auto entry = static_cast<zip_uint64_t>(added);
+      if (zip_set_file_compression(zip.get(), entry, ZIP_CM_STORE, 0) != 0 ||
+          zip_file_set_dostime(zip.get(), entry, 0, kFirstDay, 0) != 0) {
+        fail(*zip_get_error(zip.get()));
+      }
+    }
+    if (zip_close(zip.get()) != 0) fail(*zip_get_error(zip.get()));
+    static_cast<void>(zip.release());
+  }
+
+  [[noreturn]] void fail(zip_error_t& error) const {
+    const int system = zip_error_system_type(&error) == ZIP_ET_SYS ? zip_error_code_system(&error) : 0;
+    if (system != 0) cannot_be_written(folder_.target(), system);
+    cannot_be_written(folder_.target(), zip_error_strerror(&error));
+  }
+
+  TemporaryFolder folder_;
+  std::vector<Array> arrays_;
+  std::vector<std::size_t> numbers_;  // places in arrays_ of those that grow
+};
+
+}  // namespace
+
+std::unique_ptr<ArrayFile> npz_file(const std::string& file) { return std::make_unique<NpzFile>(file); }
+
+}  // namespace linden

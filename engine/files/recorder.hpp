@@ -1,0 +1,37 @@
+// engine/files/recorder.hpp
+// The motion as a table: FILE.csv with the columns time, energy and one a coordinate, named as in Names::position.
+//
+// Numbers have 17 significant digits: they read back to the same doubles. A name that holds a comma or a quote is quoted (RFC 4180).
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "engine/files/output_file.hpp"
+#include "layout/names.hpp"
+
+namespace linden {
+
+class Recorder {
+ public:
+  /// Writes the header. Throws std::runtime_error, as do add and commit, where the file cannot be written.
+  Recorder(const std::string& file, const Names& names);
+
+  void add(double time, double energy, std::span<const double> positions);
+  /// Until then there is no file of that name.
+  void commit();
+
+  std::int64_t rows() const { return rows_; }
+
+ private:
+  void flush();
+
+  OutputFile out_;
+  fmt::memory_buffer text_;
+  std::int64_t rows_ = 0;
+};
+
+}  // namespace linden

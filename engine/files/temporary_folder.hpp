@@ -1,0 +1,34 @@
+// engine/files/temporary_folder.hpp
+// For files that appear whole or not at all and that take more than one temporary file or a library to write: a hidden folder beside the
+// target holds all that is temporary, whatever it is called, and goes with all that is in it. What is ready is renamed onto the target.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace linden {
+
+/// Throws std::runtime_error: `FILE: cannot be written: reason`.
+[[noreturn]] void cannot_be_written(const std::string& file, std::string_view reason);
+/// The reason is an errno.
+[[noreturn]] void cannot_be_written(const std::string& file, int error);
+
+class TemporaryFolder {
+ public:
+  /// Throws, as publish does, cannot_be_written.
+  explicit TemporaryFolder(std::string target);
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::string& target() const { return target_; }
+  /// Where a temporary file of that name lies.
+  std::string file(std::string_view name) const;
+  /// Renames it onto the target.
+  void publish(std::string_view name);
+
+ private:
+  std::string target_, folder_;
+};
+
+}  // namespace linden

@@ -1,0 +1,99 @@
+#include "engine/program/accuracy_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "engine/files/output_file.hpp"
+#include "engine/files/report_files.hpp"
+#include "engine/program/accuracy_report.hpp"
+#include "engine/program/interrupt.hpp"
+#include "engine/program/progress.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/text.hpp"
+#include "layout/input_error.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kMostBudget = 1e6;  // [s]
+
+void check_arguments(const AccuracyArguments& arguments) {
+  check(arguments.options);
+  (void)step_count(arguments, arguments.options.step);
+  if (!(arguments.budget > 0) || arguments.budget > kMostBudget) {
+    throw InputError(fmt::format("--budget {}: expected seconds above zero, at most {:.0e}", arguments.budget, kMostBudget));
+  }
+  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
+  if (!arguments.plot.empty()) require_writable("--plot", arguments.plot, {".svg", ".png"});
+  for (const std::string& file : {arguments.json, arguments.plot}) {
+    if (!file.empty() && same_file(file, arguments.model)) throw InputError(fmt::format("{} would be overwritten", file));
+  }
+}
+
+AccuracySetup setup_of(const AccuracyArguments& arguments) {
+  AccuracySetup setup;
+  setup.options = arguments.options;
+  setup.duration = arguments.duration;
+  setup.budget = arguments.budget;
+  setup.model = arguments.loaded();
+  setup.effects = arguments.effects();
+  if (arguments.scene) {
+    setup.start = arguments.scene->initial;
+  } else if (const auto random = randomness(arguments)) {
+    setup.start = random_state(*setup.model, random->seed, random->spread);
+  }
+  return setup;
+}
+
+AccuracyFigures measure(const AccuracySetup& setup, int& signal) {
+  constexpr double kTick = 0.1;  // [s]
+  const Interrupt interrupt;
+  Progress progress(std::max<std::int64_t>(1, std::llround(setup.budget / kTick)), kTick, "s of the budget");
+  const auto go_on = [&](double gone) {
+    progress.update(std::llround(std::min(gone, setup.budget) / kTick), Progress::Clock::now());
+    return interrupt.signal() == 0;
+  };
+  AccuracyFigures figures = measure_accuracy(setup, go_on);
+  signal = figures.interrupted ? interrupt.signal() : 0;
+  return figures;
+}
+
+}  // namespace
+
+int accuracy_command(const AccuracyArguments& arguments) {
+  check_arguments(arguments);
+  const AccuracySetup setup = setup_of(arguments);
+  print_warnings(*setup.model);
+  int signal = 0;
+  const AccuracyFigures figures = measure(setup, signal);
+  bool written = true;
+  if (!arguments.json.empty()) {
+    written &= attempt([&] { write_json(arguments.json, accuracy_json(arguments, setup, figures)); });
+  }
+  const bool any = std::ranges::any_of(figures.rows, &AccuracyRow::done);
+  if (!arguments.plot.empty() && any) {
+    written &= attempt([&] { plot::draw(arguments.plot, accuracy_charts(arguments, setup, figures)); });
+  }
+  fmt::print("{}", accuracy_summary(arguments, setup, figures));
+  std::fflush(stdout);
+  if (signal != 0) {
+    fmt::print(stderr, "linden: interrupted after {}\n", counted(std::ranges::count_if(figures.rows, &AccuracyRow::done), "row"));
+    return 128 + signal;
+  }
+  if (!figures.reference.failure.empty()) {
+    fmt::print(stderr,
+               "linden: there is nothing to judge by: {}; try a smaller --dt, a shorter --duration or a larger --budget\n",
+               printable(figures.reference.failure));
+    return 1;
+  }
+  if (!any) {
+    fmt::print(stderr, "linden: no run came to its end within the budget; try a shorter --duration or a larger --budget\n");
+    return 1;
+  }
+  return written ? 0 : 1;
+}
+
+}  // namespace linden

@@ -1,0 +1,103 @@
+#include "engine/program/effect_cost.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <memory>
+
+#include "engine/simulation.hpp"
+
+namespace linden {
+namespace {
+
+constexpr int kRounds = 5;
+constexpr double kSeconds = 0.15;  // of steps of each, over all rounds
+
+using Clock = std::chrono::steady_clock;
+
+/// One way to take the scene, a few steps at a time.
+class Contender {
+ public:
+  Contender(std::string name, std::shared_ptr<const Model> model, const Scene& scene, const Effects& effects)
+      : name_(std::move(name)), simulation_(std::move(model), scene.options, effects), start_(scene.initial) {
+    begin();
+  }
+
+  /// Until `seconds` have gone by; a scene that fails begins anew.
+  void take(double seconds) {
+    const Clock::time_point begin_time = Clock::now();
+    std::int64_t steps = 0;
+    double taken = 0;
+    while (taken < seconds) {
+      for (int k = 0; k < 8; ++k, ++steps) {
+        if (!simulation_.step().ok()) begin();
+      }
+      taken = std::chrono::duration<double>(Clock::now() - begin_time).count();
+    }
+    least_ = std::min(least_, taken / static_cast<double>(steps));
+  }
+  const std::string& name() const { return name_; }
+  double seconds_per_step() const { return least_; }
+
+ private:
+  void begin() {
+    if (!start_.positions.empty()) simulation_.set_positions(start_.positions);
+    if (!start_.velocities.empty()) simulation_.set_velocities(start_.velocities);
+  }
+
+  std::string name_;
+  Simulation simulation_;
+  InitialState start_;
+  double least_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+std::vector<EffectCost> effect_costs(const Scene& scene) {
+  const auto model = std::make_shared<const Model>(scene.model);
+  std::vector<std::unique_ptr<Contender>> contenders;
+  const auto contend = [&](const char* name, const Effects& effects) {
+    contenders.push_back(std::make_unique<Contender>(name, model, scene, effects));
+  };
+  contend("none", {});
+  const auto alone = [&](const char* name, auto Effects::*list) {
+    if ((scene.effects.*list).empty()) return;
+    Effects effects;
+    effects.*list = scene.effects.*list;
+    effects.wind = scene.effects.wind;
+    contend(name, effects);
+  };
+  alone("armature", &Effects::armature);
+  if (!scene.effects.springs.empty() || !scene.effects.ball_springs.empty()) {
+    Effects effects;
+    effects.springs = scene.effects.springs;
+    effects.ball_springs = scene.effects.ball_springs;
+    contend("spring", effects);
+  }
+  alone("damping", &Effects::damping);
+  alone("friction", &Effects::friction);
+  alone("limits", &Effects::limits);
+  alone("servo", &Effects::servos);
+  alone("torque", &Effects::torques);
+  alone("wrench", &Effects::wrenches);
+  alone("drag", &Effects::drag);
+  if (scene.effects.ground) {
+    Effects effects;
+    effects.ground = scene.effects.ground;
+    contend("ground", effects);
+  }
+  contend("all", scene.effects);
+  for (int round = 0; round < kRounds; ++round) {
+    for (const auto& contender : contenders) contender->take(kSeconds / kRounds);
+  }
+  std::vector<EffectCost> costs;
+  const double none = contenders.front()->seconds_per_step();
+  for (const auto& contender : contenders) {
+    const bool whole = contender == contenders.front() || contender == contenders.back();
+    const double seconds = contender->seconds_per_step() - (whole ? 0 : none);
+    costs.push_back({contender->name(), 1e9 * seconds / model->tree.bodies()});
+  }
+  return costs;
+}
+
+}  // namespace linden

@@ -1,0 +1,392 @@
+#include "engine/program/inspect.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "engine/files/output_file.hpp"
+#include "engine/files/report_files.hpp"
+#include "engine/mass_distribution.hpp"
+#include "engine/program/effect_cost.hpp"
+#include "engine/program/effects_text.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/step/sweep_cost.hpp"
+#include "engine/step/sweeps.hpp"
+#include "engine/text.hpp"
+#include "engine/version.hpp"
+#include "layout/state.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Align = Table::Align;
+
+constexpr Index kLongTable = 60, kShown = 20;
+constexpr std::size_t kLineWidth = 120;
+
+/// How the joint in `slot` moves.
+std::string motion_of(const Model& model, Index slot, JointKind kind) {
+  if (kind == JointKind::ball) return "ball";
+  if (kind == JointKind::free) return "free";
+  if (model.constants.screw(slot, 0) == 0) return "prismatic";
+  return model.constants.screw(slot, 1) == 0 ? "revolute" : "helical";
+}
+
+std::string_view kind_name(JointKind kind) {
+  return kind == JointKind::screw ? "screw" : kind == JointKind::ball ? "ball" : "free";
+}
+
+/// "7", "0-6"
+std::string rows_text(Index first, Index count) {
+  return count == 1 ? fmt::format("{}", first) : fmt::format("{}-{}", first, first + count - 1);
+}
+
+std::string limits_text(double lower, double upper, bool turns) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return "-";
+  return fmt::format("{:.4g} to {:.4g} {}", lower, upper, turns ? "rad" : "m");
+}
+
+/// One body with all that is said of it.
+struct BodyFacts {
+  Index slot, parent;
+  std::string body, parent_body, joint, motion;
+  JointKind kind;
+  Index first_q, first_v;
+  double pitch, mass, lower, upper;
+};
+
+std::vector<BodyFacts> bodies_of(const Model& model) {
+  const Tree& tree = model.tree;
+  const auto name = [](const std::vector<std::string>& names, Index slot) { return names[static_cast<std::size_t>(slot)]; };
+  std::vector<BodyFacts> bodies;
+  for (const Run& run : tree.runs) {
+    for (Index i = run.begin; i < run.end; ++i) {
+      const Index v = tree.first_v(i);
+      bodies.push_back({.slot = i,
+                        .parent = tree.parent(i),
+                        .body = name(model.names.body, i),
+                        .parent_body = name(model.names.body, tree.parent(i)),
+                        .joint = run.kind == JointKind::screw ? name(model.names.velocity, v) : name(model.names.joint, i),
+                        .motion = motion_of(model, i, run.kind),
+                        .kind = run.kind,
+                        .first_q = tree.first_q(i),
+                        .first_v = v,
+                        .pitch = model.constants.screw(i, 1),
+                        .mass = model.constants.inertia(i, 0),
+                        .lower = model.attributes.lower(v),
+                        .upper = model.attributes.upper(v)});
+    }
+  }
+  return bodies;
+}
+
+struct MergedLink {
+  Index slot;
+  std::string name;
+};
+
+/// Links that have no body of their own, by slot and name.
+std::vector<MergedLink> merged_links(const Model& model) {
+  std::vector<MergedLink> merged;
+  for (const auto& [name, place] : model.names.link) {
+    if (place.slot == 0 || model.names.body[static_cast<std::size_t>(place.slot)] != name) merged.push_back({place.slot, name});
+  }
+  std::ranges::sort(merged, [](const MergedLink& a, const MergedLink& b) { return std::tie(a.slot, a.name) < std::tie(b.slot, b.name); });
+  return merged;
+}
+
+std::map<std::string, Index> counts_of(const std::vector<BodyFacts>& bodies) {
+  std::map<std::string, Index> counts;
+  for (const BodyFacts& body : bodies) counts[body.motion] += 1;
+  return counts;
+}
+
+Index widest_level(const Tree& tree) {
+  std::vector<Index> bodies(static_cast<std::size_t>(tree.levels()), 0);
+  for (Index i = 1; i < tree.shape.slots; ++i) bodies[static_cast<std::size_t>(tree.level(i))] += 1;
+  return *std::ranges::max_element(bodies);
+}
+
+/// The sweeps of a step, and what all of it costs on this machine.
+struct Costs {
+  std::vector<Sweep> sweeps;
+  std::vector<double> of_sweeps;    // [ns per body]; NaN where it is not one sweep
+  std::vector<EffectCost> effects;  // of a scene
+};
+
+Costs measure(const InspectArguments& arguments, const Model& model) {
+  const EffectPlan plan(model, arguments.options, arguments.effects());
+  Costs costs;
+  costs.sweeps = sweeps_of(model, arguments.options, plan);
+  const InitialState start = arguments.scene ? arguments.scene->initial : InitialState();
+  costs.of_sweeps = sweep_costs(model, arguments.options, plan, start, costs.sweeps);
+  if (arguments.scene) costs.effects = effect_costs(*arguments.scene);
+  return costs;
+}
+
+class Printer {
+ public:
+  Printer(const InspectArguments& arguments, const Model& model, const Costs& costs)
+      : arguments_(arguments), model_(model), bodies_(bodies_of(model)), costs_(costs) {}
+
+  void print() const {
+    totals();
+    effects();
+    table();
+    conventions();
+    merged();
+    mimics();
+    sweeps();
+    warnings();
+  }
+
+ private:
+  /// How many of `count` rows are printed.
+  std::size_t shown(std::size_t count) const {
+    return arguments_.all || count <= static_cast<std::size_t>(kLongTable) ? count : static_cast<std::size_t>(kShown);
+  }
+  void left_out(std::size_t count) const {
+    const auto rest = static_cast<std::int64_t>(count - shown(count));
+    if (rest > 0) fmt::print("  ... and {} more; --all prints them\n", grouped(rest));
+  }
+
+  void totals() const {
+    const Tree& tree = model_.tree;
+    const MassDistribution masses = mass_distribution(model_, model_.neutral());
+    const auto row = [](const char* label, const std::string& value) { fmt::print("{:<11} {}\n", label, value); };
+    std::vector<std::string> kinds;
+    for (const auto& [motion, count] : counts_of(bodies_)) kinds.push_back(fmt::format("{} {}", grouped(count), motion));
+    row("model", printable(model_.names.model) + ", " + base_of(model_));
+    row("bodies", fmt::format("{}: joints {}", grouped(tree.bodies()), fmt::join(kinds, ", ")));
+    const auto followers = static_cast<std::int64_t>(model_.mimics.size());
+    const std::string mimics = followers == 0 ? "" : fmt::format(" less {}", counted(followers, "mimic joint"));
+    row("freedom", fmt::format("{} of freedom; {} in q, {} in v{}", counted(model_.degrees_of_freedom(), "degree"),
+                               counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics));
+    row("mass", fmt::format("{:.6g} kg; centre of mass ({:.6g}, {:.6g}, {:.6g}) m in the zero configuration", masses.mass,
+                            masses.center.x(), masses.center.y(), masses.center.z()));
+    row("tree", fmt::format("{}, up to {} wide; {} of one joint kind", counted(tree.levels() - 1, "level"),
+                            counted(widest_level(tree), "body"), counted(static_cast<std::int64_t>(tree.runs.size()), "run")));
+    row("memory", fmt::format("state {}, constants {}, workspace {}", memory_text(bytes_for<State<double>>(tree.shape)),
+                              memory_text(bytes_for<BodyConstants<double>>(tree.shape) + bytes_for<Tree>(tree.shape)),
+                              memory_text(bytes_for<Workspace<double>>(tree.shape))));
+  }
+
+  void effects() const {
+    if (!arguments_.scene) return;
+    const Scene& scene = *arguments_.scene;
+    fmt::print("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
+    const auto& g = arguments_.options.gravity;
+    if (g != std::array<double, 3>{0, 0, 0}) fmt::print("  {:<9} {:g} {:g} {:g} m/s^2\n", "gravity", g[0], g[1], g[2]);
+    for (const EffectLine& line : effect_lines(scene.effects, model_)) {
+      fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
+    }
+    const std::vector<EffectCost>& costs = costs_.effects;
+    fmt::print("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs.front().nanoseconds,
+               costs.back().nanoseconds);
+    for (std::size_t k = 1; k + 1 < costs.size(); ++k) fmt::print("  {:<9} {:+.0f} alone\n", costs[k].name, costs[k].nanoseconds);
+  }
+
+  void table() const {
+    fmt::print("\nbodies, parents first\n");
+    Table table({{"slot", Align::right},
+                 {"body", Align::left},
+                 {"parent", Align::left},
+                 {"joint", Align::left},
+                 {"kind", Align::left},
+                 {"axis", Align::left},
+                 {"q", Align::left},
+                 {"v", Align::left},
+                 {"mass kg", Align::right},
+                 {"limits", Align::left}});
+    for (const BodyFacts& body : std::span(bodies_).first(shown(bodies_.size()))) {
+      const bool screw = body.kind == JointKind::screw;
+      const std::string axis = !screw ? "-" : body.motion == "helical" ? fmt::format("helical {:.3g} m/rad", body.pitch) : body.motion;
+      table.add({fmt::format("{}", body.slot), body.body, fmt::format("{} {}", body.parent, body.parent_body), body.joint,
+                 std::string(kind_name(body.kind)), axis, rows_text(body.first_q, position_count(body.kind)),
+                 rows_text(body.first_v, velocity_count(body.kind)), fmt::format("{:.4g}", body.mass),
+                 screw ? limits_text(body.lower, body.upper, body.motion != "prismatic") : "-"});
+    }
+    fmt::print("{}", table.text("  "));
+    left_out(bodies_.size());
+  }
+
+  void conventions() const {
+    fmt::print("\nrows of a joint\n");
+    const auto has = [&](JointKind kind) {
+      return std::ranges::any_of(model_.tree.runs, [&](const Run& run) { return run.kind == kind; });
+    };
+    if (has(JointKind::screw)) fmt::print("  screw  q: angle [rad] (prismatic: shift [m]); v: its rate\n");
+    if (has(JointKind::ball)) fmt::print("  ball   q: unit quaternion x y z w; v: angular velocity x y z in the body's frame\n");
+    if (has(JointKind::free)) {
+      fmt::print("  free   q: position x y z in the parent's frame, unit quaternion x y z w; v: angular x y z, then linear x y z, in the "
+                 "body's frame\n");
+    }
+    fmt::print("  A quaternion turns body coordinates to the parent's. A body's frame sits at its joint, the axis of a screw along z.\n");
+  }
+
+  void merged() const {
+    const std::vector<MergedLink> links = merged_links(model_);
+    if (links.empty()) return;
+    fmt::print("\nlinks behind fixed joints, merged into the body that carries them\n");
+    const std::size_t count = shown(links.size());
+    for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
+      const Index slot = links[begin].slot;
+      std::string line = fmt::format("  {} {}:", slot, printable(model_.names.body[static_cast<std::size_t>(slot)]));
+      for (end = begin; end < count && links[end].slot == slot; ++end) {
+        const std::string word = (end > begin ? ", " : " ") + printable(links[end].name);
+        if (line.size() + word.size() > kLineWidth && end > begin) {
+          fmt::print("{},\n", line);
+          line = "      " + printable(links[end].name);
+        } else {
+          line += word;
+        }
+      }
+      fmt::print("{}\n", line);
+    }
+    left_out(links.size());
+  }
+
+  void mimics() const {
+    if (model_.mimics.empty()) return;
+    fmt::print("\nmimic joints\n");
+    const auto joint = [&](Index slot) { return printable(model_.names.joint[static_cast<std::size_t>(slot)]); };
+    for (const Mimic& mimic : std::span(model_.mimics).first(shown(model_.mimics.size()))) {
+      fmt::print("  {} = {:g} x {}{}\n", joint(mimic.follower_slot), mimic.multiplier, joint(mimic.leader_slot),
+                 mimic.offset == 0 ? "" : fmt::format(" {:+g}", mimic.offset));
+    }
+    left_out(model_.mimics.size());
+  }
+
+  void sweeps() const {
+    fmt::print("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
+    Table table({{"when", Align::left}, {"sweep", Align::left}, {"ns/body", Align::right}, {"reads", Align::left}, {"writes", Align::left}},
+                kLineWidth);
+    std::string_view before;
+    for (std::size_t k = 0; k < costs_.sweeps.size(); ++k) {
+      const Sweep& sweep = costs_.sweeps[k];
+      const double cost = costs_.of_sweeps[k];
+      table.add({std::string(sweep.when == before ? "" : sweep.when), std::string(sweep.name),
+                 std::isfinite(cost) ? fmt::format("{:.2f}", cost) : "-", std::string(sweep.reads), std::string(sweep.writes)});
+      before = sweep.when;
+    }
+    fmt::print("{}", table.text("  "));
+    fmt::print("  evaluation: of the first guess and after every correction; once a step: again where a correction gains little.\n"
+               "  ns/body: of each sweep alone on this machine, over the whole tree\n");
+  }
+
+  void warnings() const {
+    if (model_.warnings.empty()) return;
+    fmt::print("\nwarnings\n");
+    for (const std::string& warning : model_.warnings) fmt::print("  {}\n", printable(warning));
+  }
+
+  const InspectArguments& arguments_;
+  const Model& model_;
+  std::vector<BodyFacts> bodies_;
+  const Costs& costs_;
+};
+
+Json json_of(const InspectArguments& arguments, const Model& model, const Costs& costs) {
+  const Tree& tree = model.tree;
+  const MassDistribution masses = mass_distribution(model, model.neutral());
+  const std::vector<BodyFacts> bodies = bodies_of(model);
+  const auto name = [](const std::vector<std::string>& names, Index slot) { return names[static_cast<std::size_t>(slot)]; };
+  Json result{{"command", "inspect"},
+              {"version", kVersion},
+              {"model", model.names.model},
+              {"source", arguments.model},
+              {"base", base_of(model)},
+              {"bodies", tree.bodies()},
+              {"dofs", model.degrees_of_freedom()},
+              {"positions", tree.shape.positions},
+              {"velocities", tree.shape.velocities},
+              {"mass", masses.mass},
+              {"center_of_mass", {masses.center.x(), masses.center.y(), masses.center.z()}},
+              {"levels", tree.levels() - 1},
+              {"widest_level", widest_level(tree)},
+              {"joints", counts_of(bodies)},
+              {"quaternion_order", "x y z w"},
+              {"twist_order", "angular linear, body frame"},
+              {"position_names", model.names.position},
+              {"velocity_names", model.names.velocity},
+              {"state_bytes", bytes_for<State<double>>(tree.shape)},
+              {"constants_bytes", bytes_for<BodyConstants<double>>(tree.shape) + bytes_for<Tree>(tree.shape)},
+              {"workspace_bytes", bytes_for<Workspace<double>>(tree.shape)}};
+  Json& table = result["table"] = Json::array();
+  for (const BodyFacts& body : bodies) {
+    // an infinite limit becomes null
+    table.push_back({{"slot", body.slot},
+                     {"body", body.body},
+                     {"parent", body.parent},
+                     {"joint", body.joint},
+                     {"kind", kind_name(body.kind)},
+                     {"motion", body.motion},
+                     {"pitch", body.pitch},
+                     {"first_q", body.first_q},
+                     {"first_v", body.first_v},
+                     {"rows_q", position_count(body.kind)},
+                     {"rows_v", velocity_count(body.kind)},
+                     {"mass", body.mass},
+                     {"lower", body.lower},
+                     {"upper", body.upper},
+                     {"damping", model.attributes.damping(body.first_v)},
+                     {"friction", model.attributes.friction(body.first_v)}});
+  }
+  Json& runs = result["runs"] = Json::array();
+  for (const Run& run : tree.runs) runs.push_back({{"begin", run.begin}, {"end", run.end}, {"kind", kind_name(run.kind)}});
+  Json& merged = result["merged_links"] = Json::array();
+  for (const MergedLink& link : merged_links(model)) merged.push_back({{"link", link.name}, {"slot", link.slot}});
+  Json& mimics = result["mimics"] = Json::array();
+  for (const Mimic& mimic : model.mimics) {
+    mimics.push_back({{"follower", name(model.names.joint, mimic.follower_slot)},
+                      {"leader", name(model.names.joint, mimic.leader_slot)},
+                      {"multiplier", mimic.multiplier},
+                      {"offset", mimic.offset}});
+  }
+  Json& sweeps = result["sweeps"] = Json::array();
+  for (std::size_t k = 0; k < costs.sweeps.size(); ++k) {
+    const Sweep& sweep = costs.sweeps[k];
+    // a cost that was not measured becomes null
+    sweeps.push_back({{"when", sweep.when},
+                      {"name", sweep.name},
+                      {"ns_per_body", costs.of_sweeps[k]},
+                      {"reads", sweep.reads},
+                      {"writes", sweep.writes}});
+  }
+  if (arguments.scene) {
+    const Scene& scene = *arguments.scene;
+    result["step"] = arguments.options.step;
+    result["duration"] = scene.duration;
+    result["gravity"] = arguments.options.gravity;
+    result["effects"] = effects_json(scene.effects, model);
+    for (const EffectCost& cost : costs.effects) result["ns_per_body_step"][cost.name] = cost.nanoseconds;
+    result["initial"] = {{"positions", scene.initial.positions}, {"velocities", scene.initial.velocities}};
+  }
+  result["warnings"] = model.warnings;
+  return result;
+}
+
+}  // namespace
+
+int inspect(const InspectArguments& arguments) {
+  check(arguments.options);
+  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
+  if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
+  const std::shared_ptr<const Model> loaded = arguments.loaded();
+  const Model& model = *loaded;
+  const Costs costs = measure(arguments, model);
+  if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs));
+  Printer(arguments, model, costs).print();
+  return 0;
+}
+
+}  // namespace linden

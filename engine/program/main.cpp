@@ -1,0 +1,410 @@
+// engine/program/main.cpp
+// The program `linden`: commands, their options, and what becomes of mistakes.
+//
+//   exit codes  0 fine, 1 the run failed, 2 bad input, 130 interrupted
+//   messages    one line on stderr that begins with "linden: "; results on stdout
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "engine/program/accuracy_command.hpp"
+#include "engine/program/inspect.hpp"
+#include "engine/program/rollout_command.hpp"
+#include "engine/program/run_command.hpp"
+#include "engine/program/scaling_command.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/scene/scene_file.hpp"
+#include "engine/text.hpp"
+#include "engine/version.hpp"
+#include "layout/words.hpp"
+
+namespace linden {
+namespace {
+
+/// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
+struct Texts {
+  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
+      shape, dofs, steps, budget;
+};
+
+std::array<double, 3> gravity_from(const std::string& text) {
+  constexpr std::string_view expected = "three numbers x,y,z in m/s^2, such as 0,0,-9.81";
+  std::array<double, 3> gravity{};
+  std::size_t begin = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t end = k < 2 ? text.find(',', begin) : text.size();
+    double value = 0;
+    const auto [rest, error] = std::from_chars(text.data() + begin, text.data() + std::min(end, text.size()), value);
+    if (end == text.npos || error != std::errc{} || rest != text.data() + end) {
+      throw InputError(fmt::format("--gravity \"{}\": expected {}", text, expected));
+    }
+    gravity[k] = value;
+    begin = end + 1;
+  }
+  return gravity;
+}
+
+void read_model_options(const Texts& texts, std::optional<Base>& base, Options& options) {
+  if (!texts.base.empty()) base = base_from(texts.base);
+  if (!texts.gravity.empty()) options.gravity = gravity_from(texts.gravity);
+}
+
+void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
+  read_model_options(texts, motion.base, options);
+  if (!texts.duration.empty()) motion.duration = number_from("--duration", texts.duration, "seconds, such as 10");
+  if (!texts.dt.empty()) options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
+  if (!texts.tolerance.empty()) options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
+  if (!texts.seed.empty()) {
+    const std::int64_t seed = integer_from("--seed", texts.seed, "a whole number, zero or more");
+    if (seed < 0) throw InputError(fmt::format("--seed {}: expected a whole number, zero or more", seed));
+    motion.seed = static_cast<std::uint64_t>(seed);
+  }
+  if (!texts.spread.empty()) motion.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
+}
+
+/// What `read` takes from the command line goes over the scene that the arguments name, if they name one.
+template <class Arguments, class Read>
+void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
+  read();
+  if (!is_scene(arguments.model)) return;
+  if (arguments.base) {
+    throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", arguments.model));
+  }
+  SceneStart start;
+  if constexpr (std::is_base_of_v<MotionArguments, Arguments> && !std::is_same_v<Arguments, RolloutArguments>) {
+    if (arguments.spread) check_spread(*arguments.spread);
+    start = {arguments.seed, arguments.spread};
+  }
+  arguments.scene = std::make_shared<const Scene>(load_scene(arguments.model, start));
+  options = arguments.scene->options;
+  if constexpr (std::is_base_of_v<MotionArguments, Arguments>) arguments.duration = arguments.scene->duration;
+  read();
+}
+
+void read_run_options(const Texts& texts, RunArguments& run) {
+  read_over_scene(run, run.options, [&] { read_motion_options(texts, run, run.options); });
+  if (!run.load.empty() && randomness(run)) {
+    throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
+  }
+  if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
+  if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
+  if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
+  if (!texts.order.empty()) {
+    const std::int64_t order = integer_from("--order", texts.order, "2, 4, 6 or 8");
+    if (order < 2 || order > 8 || order % 2 != 0) throw InputError(fmt::format("--order {}: expected 2, 4, 6 or 8", order));
+    // a tolerance that nobody chose goes with the order
+    const bool chosen = !texts.tolerance.empty() || run.options.tolerance != default_tolerance(run.options.order);
+    run.options.order = static_cast<int>(order);
+    if (!chosen) run.options.tolerance = default_tolerance(run.options.order);
+  }
+}
+
+void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
+  read_over_scene(rollout, rollout.options, [&] { read_motion_options(texts, rollout, rollout.options); });
+  if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
+  if (!texts.every.empty()) rollout.every = integer_from("--every", texts.every, "steps between frames, such as 10");
+  if (!texts.threads.empty()) {
+    const std::int64_t threads = integer_from("--threads", texts.threads, "how many, such as 8; 0 for all there are");
+    rollout.options.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
+  }
+  if (!texts.instructions.empty()) rollout.options.instructions = instructions_from(texts.instructions);
+}
+
+void read_scaling_options(const Texts& texts, ScalingArguments& scaling) {
+  MotionArguments motion;
+  motion.seed = scaling.seed;
+  motion.spread = scaling.spread;
+  read_motion_options(texts, motion, scaling.options);
+  scaling.seed = *motion.seed;
+  scaling.spread = *motion.spread;
+  if (!texts.shape.empty()) scaling.shape = scaling_shape_from(texts.shape);
+  if (!texts.dofs.empty()) scaling.sizes = scaling_sizes_from(texts.dofs);
+  if (!texts.solver.empty()) scaling.solvers = scaling_solvers_from(texts.solver);
+  if (!texts.steps.empty()) scaling.steps = integer_from("--steps", texts.steps, "how many, such as 100");
+  if (texts.duration.empty()) return;
+  if (scaling.steps) throw InputError("--duration and --steps both say how long: leave one of them out");
+  check(scaling.options);
+  scaling.steps = step_count(motion, scaling.options.step);
+}
+
+void read_accuracy_options(const Texts& texts, AccuracyArguments& accuracy) {
+  read_over_scene(accuracy, accuracy.options, [&] { read_motion_options(texts, accuracy, accuracy.options); });
+  if (!texts.budget.empty()) accuracy.budget = number_from("--budget", texts.budget, "seconds, such as 60");
+}
+
+void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
+  read_over_scene(inspect, inspect.options, [&] { read_model_options(texts, inspect.base, inspect.options); });
+  if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
+}
+
+constexpr const char* kSceneHelp = "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
+constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
+
+/// Options of one command, each a text until all have been read.
+struct Adding {
+  CLI::App* command;
+
+  void operator()(const char* group, const char* name, std::string& text, const char* value, const char* meaning) const {
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
+  }
+  void model(std::string& name, const char* help = kModelHelp) const {
+    command->add_option("MODEL", name, help)->required()->option_text(" ");
+  }
+  void base(const char* group, Texts& texts) const {
+    (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
+  }
+  void duration(Texts& texts) const { (*this)("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10"); }
+  void step(Texts& texts) const { (*this)("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3"); }
+  void gravity(const char* group, Texts& texts) const {
+    (*this)(group, "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
+  }
+  void spread(const char* group, Texts& texts) const {
+    (*this)(group, "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
+  }
+};
+
+CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
+  CLI::App* command = program.add_subcommand("run", "Simulate one model or scene.");
+  const Adding add{command};
+  add.model(run.model, kSceneHelp);
+  add.base("Motion", texts);
+  add.duration(texts);
+  add.step(texts);
+  add.gravity("Motion", texts);
+  add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
+  add.spread("Start", texts);
+  add("Start", "--load", run.load, "FILE", "continue from a checkpoint");
+  add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
+  add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
+  add("Method", "--stop", texts.stop, "NAME", "energy (default: relative) or absolute (|r| in N m s)");
+  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10, above order 2 less");
+  add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
+  add("Output", "--record", run.record, "FILE.csv", "time, energy and all coordinates, one row a step");
+  add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
+  add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");
+  add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
+  command->footer(
+      "Coordinates are named after their joints; quaternions are x y z w. Ctrl-C ends a run early and keeps its files.\n"
+      "What is given here goes over what a scene says.\n\n"
+      "Examples:\n"
+      "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"
+      "  linden run models/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --plot energy.png\n"
+      "  linden run chain:100 --duration 5 --dt 1e-3 --record chain.csv --json chain.json");
+  return command;
+}
+
+CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout) {
+  CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model or scene at once.");
+  const Adding add{command};
+  add.model(rollout.model, kSceneHelp);
+  add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
+  add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
+  add.spread("Instances", texts);
+  add.base("Motion", texts);
+  add.duration(texts);
+  add.step(texts);
+  add.gravity("Motion", texts);
+  add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10; single precision stops at 3e-6");
+  command->add_flag("--float", rollout.single, "single precision: twice as fast, half the memory")->group("Method");
+  add("Processor", "--threads", texts.threads, "T", "default: all there are; results do not depend on it");
+  add("Processor", "--instructions", texts.instructions, "NAME", "scalar, baseline, avx2 or avx512; default: the best there is");
+  add("Output", "--record", rollout.record, "FILE.npz|h5", "time, q, v, energy and status of all instances");
+  add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
+  add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
+  command->footer(
+      "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C ends a rollout early\n"
+      "and keeps its files.\n\n"
+      "Examples:\n"
+      "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
+      "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"
+      "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10");
+  return command;
+}
+
+CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling) {
+  CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
+  const Adding add{command};
+  add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random or humanoids");
+  add("Models", "--dofs", texts.dofs, "A..B", "least and most degrees of freedom, default 10..100000");
+  add("Models", "--seed", texts.seed, "K", "each starts from random positions and speeds, default 1");
+  add.spread("Models", texts);
+  add("Motion", "--steps", texts.steps, "K", "measured steps of each size, default: at least 5, as many as fit in 0.3 s");
+  add("Motion", "--duration", texts.duration, "S", "or their simulated time [s]");
+  add.step(texts);
+  add.gravity("Motion", texts);
+  add("Method", "--solver", texts.solver, "NAMES", "newton (default), riqn or newton,riqn");
+  add("Output", "--json", scaling.json, "FILE.json", "rows and fits, for scripts");
+  add("Output", "--plot", scaling.plot, "FILE.svg|png", "time per step over degrees of freedom");
+  command->footer(
+      "Each row is a size and a solver. Ctrl-C ends the measurement early and keeps the rows that are done.\n\n"
+      "Examples:\n"
+      "  linden scaling --dofs 10..10000 --solver newton,riqn --plot scaling.png\n"
+      "  linden scaling --shape humanoids --dofs 36..36000 --steps 100 --json scaling.json");
+  return command;
+}
+
+CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accuracy) {
+  CLI::App* command =
+      program.add_subcommand("accuracy", "Measure what accuracy costs on a model or scene, and say which method to use.");
+  const Adding add{command};
+  add.model(accuracy.model, kSceneHelp);
+  add.base("Motion", texts);
+  add.duration(texts);
+  add("Motion", "--dt", texts.dt, "S", "steps from 16 times to a quarter of this are tried, default 1e-3");
+  add.gravity("Motion", texts);
+  add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
+  add.spread("Start", texts);
+  add("Study", "--budget", texts.budget, "S", "seconds that all of it may take, default 60");
+  add("Output", "--json", accuracy.json, "FILE.json", "rows, fits and advice, for scripts");
+  add("Output", "--plot", accuracy.plot, "FILE.svg|png", "error and energy over CPU time");
+  command->footer(
+      "Runs orders 2, 4, 6, 8, RK4 and semi-implicit Euler against a reference that two methods agree on. Ctrl-C ends it early and\n"
+      "keeps the rows that are done.\n\n"
+      "Examples:\n"
+      "  linden accuracy chain:10 --duration 2 --plot accuracy.png\n"
+      "  linden accuracy models/humanoid.urdf --base floating --spread 0.5 --budget 30 --json accuracy.json");
+  return command;
+}
+
+CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
+  CLI::App* command =
+      program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
+  const Adding add{command};
+  add.model(inspect.model, kSceneHelp);
+  add.base("Options", texts);
+  add.gravity("Options", texts);
+  add("Options", "--solver", texts.solver, "NAME", "newton (default) or riqn");
+  command->add_flag("--all", inspect.all, "long tables whole, not their first 20 rows");
+  add("Options", "--json", inspect.json, "FILE.json", "the same for scripts");
+  command->footer("Example:\n  linden inspect models/humanoid.urdf --base floating");
+  return command;
+}
+
+/// At most one empty line in a row.
+std::string with_single_gaps(std::string text) {
+  for (std::size_t at = 0; (at = text.find("\n\n\n", at)) != text.npos;) text.erase(at, 1);
+  return text;
+}
+
+/// What CLI11 could not place: most often a slip in an option's name.
+void refuse_leftovers(const CLI::App& app, const std::string& command) {
+  const std::vector<std::string> extras = app.remaining();
+  if (extras.empty()) return;
+  const auto option = std::ranges::find_if(extras, [](const std::string& text) { return text.starts_with('-'); });
+  std::vector<std::string> known;
+  if (option == extras.end()) {
+    for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) known.push_back(sub->get_name());
+  } else {
+    for (const CLI::Option* entry : app.get_options()) {
+      for (const std::string& name : entry->get_lnames()) known.push_back("--" + name);
+    }
+  }
+  const std::string word = option == extras.end() ? extras.front() : option->substr(0, option->find('='));
+  const std::string guess = nearest(word, known);
+  const char* what = option != extras.end() ? "unknown option" : known.empty() ? "unexpected argument" : "unknown command";
+  throw InputError(fmt::format("{} {}; {}", what, word,
+                               guess.empty() ? fmt::format("{} --help lists what there is", command)
+                                             : fmt::format("did you mean {}?", guess)));
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App program("Simulates trees of rigid bodies with a variational integrator, in time linear in their number.", "linden");
+  program.set_version_flag("--version", fmt::format("linden {}", kVersion));
+  program.footer("Examples:\n"
+                 "  linden run chain:100 --duration 5 --plot energy.png\n"
+                 "  linden rollout models/humanoid.urdf --base floating --instances 4096 --duration 1\n"
+                 "  linden accuracy chain:10 --duration 2\n"
+                 "  linden scaling --dofs 10..10000\n"
+                 "  linden inspect models/humanoid.urdf --base floating\n\n"
+                 "linden COMMAND --help says more.");
+  program.get_formatter()->column_width(30);
+  Texts texts;
+  RunArguments run_arguments;
+  RolloutArguments rollout_arguments;
+  ScalingArguments scaling_arguments;
+  AccuracyArguments accuracy_arguments;
+  InspectArguments inspect_arguments;
+  const CLI::App* run = add_run(program, texts, run_arguments);
+  const CLI::App* rollout = add_rollout(program, texts, rollout_arguments);
+  const CLI::App* accuracy = add_accuracy(program, texts, accuracy_arguments);
+  const CLI::App* scaling = add_scaling(program, texts, scaling_arguments);
+  const CLI::App* inspection = add_inspect(program, texts, inspect_arguments);
+  program.allow_extras();
+  for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->allow_extras();
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    fmt::print("{}", with_single_gaps(program.help()));
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);  // --version
+    std::string help = "linden";
+    for (const CLI::App* command : {run, rollout, accuracy, scaling, inspection}) {
+      if (!command->parsed()) continue;
+      help = "linden " + command->get_name();
+      refuse_leftovers(*command, help);
+    }
+    throw InputError(fmt::format("{}; {} --help says more", error.what(), help));
+  }
+  refuse_leftovers(program, "linden");
+  if (run->parsed()) {
+    refuse_leftovers(*run, "linden run");
+    read_run_options(texts, run_arguments);
+    return run_command(run_arguments);
+  }
+  if (rollout->parsed()) {
+    refuse_leftovers(*rollout, "linden rollout");
+    read_rollout_options(texts, rollout_arguments);
+    return rollout_command(rollout_arguments);
+  }
+  if (accuracy->parsed()) {
+    refuse_leftovers(*accuracy, "linden accuracy");
+    read_accuracy_options(texts, accuracy_arguments);
+    return accuracy_command(accuracy_arguments);
+  }
+  if (scaling->parsed()) {
+    refuse_leftovers(*scaling, "linden scaling");
+    read_scaling_options(texts, scaling_arguments);
+    return scaling_command(scaling_arguments);
+  }
+  if (inspection->parsed()) {
+    refuse_leftovers(*inspection, "linden inspect");
+    read_inspect_options(texts, inspect_arguments);
+    return inspect(inspect_arguments);
+  }
+  throw InputError("no command given; choose run, rollout, accuracy, scaling or inspect; linden --help says more");
+}
+
+int complain(std::string_view message, int exit_code) {
+  fmt::print(stderr, "linden: {}\n", printable(message));
+  return exit_code;
+}
+
+}  // namespace
+}  // namespace linden
+
+int main(int argc, char** argv) {
+  using linden::complain;
+  try {
+    return linden::run_program(argc, argv);
+  } catch (const linden::InputError& error) {
+    return complain(error.what(), 2);
+  } catch (const std::bad_alloc&) {
+    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
+  } catch (const std::length_error&) {
+    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
+  } catch (const std::exception& error) {
+    return complain(error.what(), 1);
+  }
+}

@@ -1,0 +1,91 @@
+#include "engine/program/motion_arguments.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <vector>
+
+#include "engine/initial_state.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/text.hpp"
+#include "layout/input_error.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kMostSteps = 1e12;
+
+}  // namespace
+
+std::shared_ptr<const Model> ModelArguments::loaded() const {
+  if (scene) return {scene, &scene->model};
+  return std::make_shared<const Model>(load_model(model, base));
+}
+
+std::optional<Randomness> randomness(const MotionArguments& arguments) {
+  if (!arguments.seed && !arguments.spread) return std::nullopt;
+  return Randomness{arguments.seed.value_or(kDefaultSeed), arguments.spread.value_or(kDefaultSpread)};
+}
+
+std::string start_text(const MotionArguments& arguments) {
+  if (const auto random = randomness(arguments)) {
+    return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "",
+                       random->seed, random->spread);
+  }
+  return arguments.scene ? "as the scene says" : "at rest in the zero configuration";
+}
+
+void check_spread(double spread) {
+  if (!std::isfinite(spread) || spread < 0) throw InputError(fmt::format("--spread {}: expected a finite number, zero or more", spread));
+}
+
+std::int64_t step_count(const MotionArguments& arguments, double step) {
+  if (arguments.spread) check_spread(*arguments.spread);
+  const double duration = arguments.duration;
+  // a duration that misses a whole number of steps by rounding is that whole number
+  constexpr double kSlack = 1e-9;
+  if (!std::isfinite(duration) || !(duration >= step * (1 - kSlack))) {
+    throw InputError(fmt::format("--duration {}: expected a finite number of seconds, at least one step ({} s)", duration, step));
+  }
+  if (duration / step > kMostSteps) {
+    throw InputError(fmt::format("--duration {} s in steps of {} s makes {:.3g} steps; at most {:.0e} can be taken", duration, step,
+                                 duration / step, kMostSteps));
+  }
+  return std::llround(duration / step);
+}
+
+std::string model_text(const ModelArguments& arguments, const Model& model) {
+  const std::string name = model.names.model.starts_with(arguments.model)
+                               ? printable(model.names.model)
+                               : printable(fmt::format("{} ({})", model.names.model, arguments.model));
+  return fmt::format("{}: {}, {} of freedom, {:.5g} kg, {}", name, counted(model.tree.bodies(), "body"),
+                     counted(model.degrees_of_freedom(), "degree"), model.constants.subtree_mass(0), base_of(model));
+}
+
+std::string gravity_text(const Options& options) {
+  const auto& g = options.gravity;
+  if (g == std::array<double, 3>{0, 0, 0}) return "no gravity";
+  return fmt::format("gravity {:g} {:g} {:g} m/s^2", g[0], g[1], g[2]);
+}
+
+LeftOut::LeftOut(const Model& model, const Effects& effects) {
+  for (Index slot = 1; slot < model.tree.shape.slots; ++slot) {
+    const Index row = model.tree.first_v(slot);
+    limits += std::isfinite(model.attributes.lower(row)) || std::isfinite(model.attributes.upper(row)) ? 1 : 0;
+    damping += model.attributes.damping(row) > 0 ? 1 : 0;
+    friction += model.attributes.friction(row) > 0 ? 1 : 0;
+  }
+  if (!effects.limits.empty()) limits = 0;
+  if (!effects.damping.empty()) damping = 0;
+  if (!effects.friction.empty()) friction = 0;
+}
+
+std::string LeftOut::text() const {
+  std::vector<std::string> parts;
+  if (limits > 0) parts.push_back(fmt::format("limits of {}", counted(limits, "joint")));
+  if (damping > 0) parts.push_back(fmt::format("damping of {}", damping));
+  if (friction > 0) parts.push_back(fmt::format("friction of {}", friction));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+}  // namespace linden

@@ -1,0 +1,61 @@
+// engine/program/motion_arguments.hpp
+// What a command is told of the model or scene it is for, and, if it moves it, how long and from where; and how that is said to people.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "engine/options.hpp"
+#include "engine/scene/scene.hpp"
+#include "layout/urdf.hpp"
+
+namespace linden {
+
+struct ModelArguments {
+  std::string model;  // as it was given: a file, a generator with its size, a scene
+  std::optional<Base> base;
+  std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
+
+  Effects effects() const { return scene ? scene->effects : Effects(); }
+  /// The scene's model, or the one that `model` names. Throws InputError.
+  std::shared_ptr<const Model> loaded() const;
+};
+
+struct MotionArguments : ModelArguments {
+  double duration = 10;  // [s]
+  std::optional<std::uint64_t> seed;
+  std::optional<double> spread;
+};
+
+/// Seed and spread as they are used; nothing where neither was given.
+struct Randomness {
+  std::uint64_t seed;
+  double spread;
+};
+std::optional<Randomness> randomness(const MotionArguments& arguments);
+
+/// "at rest in the zero configuration", "as the scene says, from random positions and speeds, seed 1, spread 0.1"
+std::string start_text(const MotionArguments& arguments);
+
+/// Throws InputError for a spread that makes no sense.
+void check_spread(double spread);
+
+/// Steps that the duration is. Throws InputError for a duration or a spread that makes no sense.
+std::int64_t step_count(const MotionArguments& arguments, double step);
+
+/// "humanoid (models/humanoid.urdf): 35 bodies, 40 degrees of freedom, 75 kg, floating base"
+std::string model_text(const ModelArguments& arguments, const Model& model);
+/// "gravity 0 0 -9.81 m/s^2", "no gravity"
+std::string gravity_text(const Options& options);
+
+/// What the model's file says of its joints and no effect takes up.
+struct LeftOut {
+  int limits = 0, damping = 0, friction = 0;
+  explicit LeftOut(const Model& model, const Effects& effects = {});
+  /// Empty where there is nothing.
+  std::string text() const;
+};
+
+}  // namespace linden

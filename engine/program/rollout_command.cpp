@@ -1,0 +1,203 @@
+#include "engine/program/rollout_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "engine/files/output_file.hpp"
+#include "engine/files/report_files.hpp"
+#include "engine/files/rollout_file.hpp"
+#include "engine/initial_state.hpp"
+#include "engine/program/interrupt.hpp"
+#include "engine/program/progress.hpp"
+#include "engine/program/rollout_report.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/text.hpp"
+#include "layout/input_error.hpp"
+
+namespace linden {
+namespace {
+
+using Clock = Progress::Clock;
+
+void check_arguments(const RolloutArguments& arguments) {
+  if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
+  if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
+  if (!arguments.record.empty()) require_writable("--record", arguments.record, {".npz", ".h5"});
+  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
+  for (const std::string& file : {arguments.record, arguments.json}) {
+    if (!file.empty() && same_file(file, arguments.model)) throw InputError(fmt::format("{} would overwrite the model", file));
+  }
+}
+
+/// Refuses more instances than this machine's memory holds, with what is computed of all of them at once.
+template <class Real>
+void check_instances(const RolloutArguments& arguments, const Shape& shape) {
+  const double nq = shape.positions, nv = shape.velocities;
+  double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
+  if (!arguments.record.empty()) numbers += nq + nv;
+  const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
+  require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
+                 static_cast<double>(arguments.instances) * each);
+}
+
+/// One rollout from its start to its files.
+template <class Real>
+class Execution {
+ public:
+  Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
+      : arguments_(arguments),
+        batch_(std::move(model), arguments.instances, arguments.options, arguments.effects()) {
+    figures_.steps_planned = steps;
+    figures_.lanes = batch_.lanes();
+    figures_.threads = batch_.threads();
+    const Randomness random = *randomness(arguments);
+    batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
+      const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
+      const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread)
+                                                 : random_state(batch_.model(), seed, random.spread);
+      std::ranges::copy(state.positions, positions.begin());
+      std::ranges::copy(state.velocities, velocities.begin());
+    });
+    figures_.bytes = batch_.bytes();
+    if (!arguments.record.empty()) {
+      file_.emplace(arguments.record, batch_.model().names, arguments.instances);
+      const auto room = [&](Index rows) { return static_cast<std::size_t>(arguments.instances) * static_cast<std::size_t>(rows); };
+      q_.resize(room(batch_.model().tree.shape.positions));
+      v_.resize(room(batch_.model().tree.shape.velocities));
+      status_.resize(room(1));
+    }
+    energy_.resize(static_cast<std::size_t>(arguments.instances));
+  }
+
+  void steps() {
+    const Interrupt interrupt;
+    Progress progress(figures_.steps_planned, arguments_.options.step);
+    std::int64_t stretch = 1;  // steps between two looks at the clock
+    look();
+    while (figures_.steps < figures_.steps_planned && interrupt.signal() == 0) {
+      std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
+      if (file_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
+      const Clock::time_point begin = Clock::now();
+      batch_.step(end - figures_.steps);
+      const Clock::time_point now = Clock::now();
+      const double taken = seconds(now - begin);
+      figures_.step_seconds += taken;
+      figures_.steps = end;
+      if (taken > 0.4) stretch = std::max<std::int64_t>(1, stretch / 2);
+      if (taken < 0.1) stretch = std::min(2 * stretch, figures_.steps_planned);
+      if (file_ && figures_.steps % arguments_.every == 0) look();
+      progress.update(figures_.steps, now);
+    }
+    if (looked_at_ != figures_.steps) look();
+    if (figures_.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
+    finish();
+  }
+
+  /// Complaints go to stderr; true where there were none.
+  bool write_files() {
+    bool fine = true;
+    if (file_) {
+      fine = attempt([&] {
+        file_->commit();
+        figures_.frames = file_->frames();
+      });
+    }
+    if (!arguments_.json.empty()) {
+      fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
+    }
+    return fine;
+  }
+
+  RolloutFigures& figures() { return figures_; }
+
+ private:
+  /// Energies of all instances, and a frame of the file.
+  void look() {
+    const auto seen = batch_.observe();
+    const auto velocities = seen.velocities(), energies = seen.energies();
+    const auto positions = batch_.positions();
+    const bool first = looked_at_ < 0;
+    if (first) {
+      figures_.first_energy.resize(energy_.size());
+      figures_.most_kinetic.resize(energy_.size());
+    }
+    for (std::int64_t i = 0; i < arguments_.instances; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const auto kinetic = static_cast<double>(energies(i, 0));
+      const double total = kinetic + static_cast<double>(energies(i, 1));
+      energy_[at] = static_cast<Real>(total);
+      if (first) figures_.first_energy[at] = total;
+      figures_.most_kinetic[at] = std::max(figures_.most_kinetic[at], kinetic);
+      if (!file_) continue;
+      std::ranges::copy(positions.instance(i), q_.begin() + i * positions.rows());
+      std::ranges::copy(velocities.instance(i), v_.begin() + i * velocities.rows());
+      status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
+    }
+    if (file_) file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, q_, v_, energy_, status_);
+    looked_at_ = figures_.steps;
+  }
+
+  void finish() {
+    constexpr std::size_t kMostTexts = 5;
+    figures_.summary = batch_.summary();
+    figures_.last_energy.assign(energy_.begin(), energy_.end());
+    for (std::int64_t i = 0; i < arguments_.instances && figures_.failures.size() < kMostTexts; ++i) {
+      const InstanceRecord& record = batch_.record(i);
+      if (record.status == StepStatus::converged) continue;
+      figures_.failures.push_back(fmt::format("instance {} at {:.6g} s: {}", i,
+                                              static_cast<double>(record.steps) * arguments_.options.step, batch_.describe(i)));
+    }
+  }
+
+  const RolloutArguments& arguments_;
+  BatchOf<Real> batch_;
+  RolloutFigures figures_;
+  std::optional<RolloutFile<Real>> file_;
+  std::vector<Real> q_, v_, energy_;
+  std::vector<std::uint8_t> status_;
+  std::int64_t looked_at_ = -1;
+};
+
+template <class Real>
+int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
+  check_instances<Real>(arguments, model->tree.shape);
+  Execution<Real> rollout(arguments, model, steps);
+  rollout.steps();
+  RolloutFigures& figures = rollout.figures();
+  figures.total_seconds = seconds(Clock::now() - begin);
+  const bool written = rollout.write_files();
+  fmt::print("{}", rollout_summary(arguments, *model, figures));
+  std::fflush(stdout);
+  if (figures.signal != 0) {
+    fmt::print(stderr, "linden: interrupted after {} of {} steps{}\n", grouped(figures.steps), grouped(figures.steps_planned),
+               figures.frames > 0 ? printable(fmt::format("; {} is valid up to there", arguments.record)) : "");
+    return 128 + figures.signal;
+  }
+  if (figures.summary.frozen > 0) {
+    fmt::print(stderr, "linden: {} of {} instances failed and were frozen at their last good state\n", grouped(figures.summary.frozen),
+               grouped(arguments.instances));
+  }
+  return written && figures.summary.frozen == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int rollout_command(const RolloutArguments& given) {
+  const Clock::time_point begin = Clock::now();
+  RolloutArguments arguments = given;
+  check(arguments.options);
+  const std::int64_t steps = step_count(arguments, arguments.options.step);
+  check_arguments(arguments);
+  if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
+  const std::shared_ptr<const Model> model = arguments.loaded();
+  print_warnings(*model);
+  return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
+}
+
+}  // namespace linden

@@ -1,0 +1,30 @@
+// engine/program/rollout_command.hpp
+// `linden rollout`: many instances of one model, each from a random start of its own.
+//
+//   start     instance i starts from random_state(seed + i, spread)
+//   steps     all instances, in stretches of some tenths of a second between which progress is shown and an interrupt heard
+//   fails     an instance whose step fails is frozen at its last good state; the others go on, and the exit code is 1
+//   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "engine/batch.hpp"
+#include "engine/program/motion_arguments.hpp"
+
+namespace linden {
+
+struct RolloutArguments : MotionArguments {
+  BatchOptions options;
+  std::int64_t instances = 1024;
+  bool single = false;      // float instead of double
+  std::int64_t every = 1;   // steps between recorded frames
+  std::string record, json;  // files; empty = none
+};
+
+/// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 130 after Ctrl-C. Throws InputError for bad
+/// input.
+int rollout_command(const RolloutArguments& arguments);
+
+}  // namespace linden

@@ -1,0 +1,148 @@
+#include "engine/program/rollout_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "engine/program/effects_text.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/text.hpp"
+#include "engine/version.hpp"
+
+namespace linden {
+namespace {
+
+/// Change of energy from the first state to the last, over the instances, relative to each one's largest kinetic energy.
+struct EnergyChange {
+  double mean = 0, median = 0, most = 0;  // mean keeps the sign: it shows a drift that all share
+  std::int64_t worst = 0;                 // instance
+
+  explicit EnergyChange(const RolloutFigures& figures) {
+    std::vector<double> sizes;
+    for (std::size_t i = 0; i < figures.first_energy.size(); ++i) {
+      const double scale = figures.most_kinetic[i];
+      const double change = scale > 0 ? (figures.last_energy[i] - figures.first_energy[i]) / scale : 0;
+      mean += change / static_cast<double>(figures.first_energy.size());
+      sizes.push_back(std::abs(change));
+      if (std::abs(change) > most) {
+        most = std::abs(change);
+        worst = static_cast<std::int64_t>(i);
+      }
+    }
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    median = *middle;
+  }
+};
+
+double ns_per_body_step(const Model& model, const RolloutFigures& figures) {
+  return 1e9 * figures.threads / (figures.steps_per_second() * model.tree.bodies());
+}
+
+double evaluations_mean(const RolloutFigures& figures) {
+  return static_cast<double>(figures.summary.evaluations) / static_cast<double>(figures.summary.steps);
+}
+
+}  // namespace
+
+std::string rollout_summary(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures) {
+  const BatchOptions& options = arguments.options;
+  std::string text;
+  const auto row = [&](const char* label, const std::string& value) { text += fmt::format("{:<11} {}\n", label, value); };
+  const auto random = randomness(arguments);
+
+  row("model", model_text(arguments, model));
+  row("instances", fmt::format("{}, {} of {} kept", grouped(arguments.instances), memory_text(figures.bytes),
+                               arguments.single ? "single precision" : "double precision"));
+  row("start", fmt::format("{}random positions and speeds, seeds {} to {}, spread {:g}", arguments.scene ? "as the scene says, with " : "",
+                           random->seed, random->seed + static_cast<std::uint64_t>(arguments.instances) - 1, random->spread));
+  const Effects effects = arguments.effects();
+  std::string label = "effects";
+  for (const EffectLine& line : effect_lines(effects, model)) {
+    row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
+    label.clear();
+  }
+  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) row("ignored", left_out + "; a scene can name them");
+  row("method", fmt::format("newton, step {:g} s, tolerance {:g} (energy), {}", options.step,
+                            arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance,
+                            gravity_text(options)));
+  row("processor", fmt::format("{} of {} instances ({})", counted(figures.threads, "thread"), figures.lanes,
+                               model.mimics.empty() ? std::string(name(options.instructions.value_or(best_instructions())))
+                                                    : "mimic joints: stepped one by one"));
+  if (figures.summary.steps > 0) {
+    const double simulated = static_cast<double>(figures.steps) * options.step;
+    row("rollout", figures.signal == 0 ? fmt::format("{:.6g} s, {} of every instance", simulated, counted(figures.steps, "step"))
+                                       : fmt::format("{:.6g} of {:.6g} s", simulated, static_cast<double>(figures.steps_planned) * options.step));
+    row("speed", fmt::format("{} env-steps/s, {:.1f} ns per body and step on a thread, {:.4g} times real time",
+                             grouped(std::llround(figures.steps_per_second())), ns_per_body_step(model, figures),
+                             figures.steps_per_second() * options.step));
+    row("iterations", fmt::format("{:.3f} evaluations of the residual per step{}", evaluations_mean(figures),
+                                  figures.summary.rescued > 0 && model.mimics.empty()
+                                      ? fmt::format("; {} taken alone", counted(figures.summary.rescued, "step"))
+                                      : ""));
+    // where effects give and take its change says nothing
+    const EnergyChange energy(figures);
+    if (effect_lines(effects, model).empty()) row("energy", fmt::format("changes by {:+.1e} of the kinetic energy in the mean, {:.1e} in the median, {:.1e} at most (instance {})",
+                              energy.mean, energy.median, energy.most, grouped(energy.worst)));
+  }
+  if (figures.frames > 0) row("", printable(fmt::format("{}: {}", arguments.record, counted(figures.frames, "frame"))));
+  if (figures.summary.frozen > 0) {
+    row("frozen", fmt::format("{} at the last good state:", counted(figures.summary.frozen, "instance")));
+    for (const std::string& failure : figures.failures) row("", printable(failure));
+    if (figures.summary.frozen > static_cast<std::int64_t>(figures.failures.size())) row("", "...");
+  }
+  return text;
+}
+
+nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures) {
+  using Json = nlohmann::ordered_json;
+  const BatchOptions& options = arguments.options;
+  const auto random = randomness(arguments);
+  const EnergyChange energy(figures);
+  const bool ran = figures.summary.steps > 0;
+  const auto if_ran = [&](double value) { return ran && std::isfinite(value) ? Json(value) : Json(nullptr); };
+  return Json{
+      {"command", "rollout"},
+      {"version", kVersion},
+      {"model", model.names.model},
+      {"source", arguments.model},
+      {"base", base_of(model)},
+      {"bodies", model.tree.bodies()},
+      {"dofs", model.degrees_of_freedom()},
+      {"instances", arguments.instances},
+      {"threads", figures.threads},
+      {"lanes", figures.lanes},
+      {"instructions", name(options.instructions.value_or(best_instructions()))},
+      {"precision", arguments.single ? "single" : "double"},
+      {"bytes", figures.bytes},
+      {"tolerance", arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance},
+      {"step", options.step},
+      {"gravity", options.gravity},
+      {"seed", random->seed},
+      {"spread", random->spread},
+      {"steps_planned", figures.steps_planned},
+      {"steps", figures.steps},
+      {"env_steps", figures.summary.steps},
+      {"wall_seconds", figures.step_seconds},
+      {"total_seconds", figures.total_seconds},
+      {"env_steps_per_second", if_ran(figures.steps_per_second())},
+      {"ns_per_body_step", if_ran(ns_per_body_step(model, figures))},
+      {"iterations_mean", if_ran(evaluations_mean(figures) - 1)},
+      {"evaluations_mean", if_ran(evaluations_mean(figures))},
+      {"steps_alone", figures.summary.rescued},
+      {"energy_change_mean", energy.mean},
+      {"energy_change_median", energy.median},
+      {"energy_change_most", energy.most},
+      {"energy_change_most_instance", energy.worst},
+      {"energy_change_is", "from first to last state, relative to the instance's largest kinetic energy"},
+      {"frames", figures.frames},
+      {"failures", figures.summary.frozen},
+      {"failure_texts", figures.failures},
+      {"interrupted", figures.signal != 0},
+      {"warnings", model.warnings},
+  };
+}
+
+}  // namespace linden

@@ -1,0 +1,31 @@
+// engine/program/rollout_report.hpp
+// How a rollout went: for people and for scripts.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/program/rollout_command.hpp"
+
+namespace linden {
+
+/// Counted while a rollout goes on.
+struct RolloutFigures {
+  std::int64_t steps_planned = 0, steps = 0;  // of each instance
+  double step_seconds = 0, total_seconds = 0;  // by the clock: within Batch::step, and everything
+  int lanes = 0, threads = 0;
+  std::size_t bytes = 0;  // kept of the instances
+  BatchSummary summary;
+  std::vector<double> first_energy, last_energy, most_kinetic;  // of each instance [J]
+  std::vector<std::string> failures;                            // the first few, one sentence each
+  int signal = 0;                                               // that ended the rollout
+  std::int64_t frames = 0;                                      // recorded
+
+  double steps_per_second() const { return static_cast<double>(summary.steps) / step_seconds; }
+};
+
+std::string rollout_summary(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures);
+nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures);
+
+}  // namespace linden

@@ -1,0 +1,24 @@
+// engine/program/run_command.hpp
+// `linden run`: simulates one model or scene and writes what it was asked to.
+//
+//   checks    options, outputs, model: all that can be wrong is found before the first step
+//   steps     energy is sampled after every step when recording and in runs of up to 20,000 steps, else about 20,000 times; the time
+//             that sampling and writing take is not counted as time of steps
+//   writes    files appear whole or not at all. A run that fails or is interrupted leaves them valid up to its last good step.
+#pragma once
+
+#include <string>
+
+#include "engine/program/motion_arguments.hpp"
+
+namespace linden {
+
+struct RunArguments : MotionArguments {
+  Options options;
+  std::string record, json, plot, save, load;  // files; empty = none
+};
+
+/// Returns the exit code: 0, 1 where a step failed or a file could not be written, 130 after Ctrl-C. Throws InputError for bad input.
+int run_command(const RunArguments& arguments);
+
+}  // namespace linden

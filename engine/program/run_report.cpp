@@ -1,0 +1,221 @@
+#include "engine/program/run_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "engine/program/effects_text.hpp"
+#include "engine/scene/load_model.hpp"
+#include "engine/step/composition.hpp"
+#include "engine/text.hpp"
+#include "engine/version.hpp"
+
+namespace linden {
+namespace {
+
+std::string begin_text(const RunArguments& arguments, const RunFigures& figures) {
+  return arguments.load.empty() ? start_text(arguments) : fmt::format("{}, at {:.6g} s", arguments.load, figures.begin);
+}
+
+double mean(std::int64_t sum, std::int64_t count) { return static_cast<double>(sum) / static_cast<double>(count); }
+
+double steps_per_second(const RunFigures& figures) { return static_cast<double>(figures.steps) / figures.step_seconds; }
+
+double ns_per_body_step(const Model& model, const RunFigures& figures) {
+  return 1e9 * figures.step_seconds / (static_cast<double>(figures.steps) * model.tree.bodies());
+}
+
+/// "order 4 (5 sub-steps), "; of order 2, which most runs have, nothing.
+std::string order_text(const Options& options) {
+  if (options.order == 2) return "";
+  return fmt::format("order {} ({} sub-steps), ", options.order, composition(options.order).size());
+}
+
+std::string plural(std::int64_t number, const char* one, const char* more) { return number == 1 ? one : more; }
+
+}  // namespace
+
+std::string energy_advice(const Options& options, const EnergyDrift& energy) {
+  constexpr double kTooFar = 0.05, kRounding = 1e-9;
+  if (!(energy.band() > kTooFar * energy.scale()) || energy.band() <= kRounding * std::abs(energy.initial())) return "";
+  return fmt::format("energy strays by {:.2g} % of the largest kinetic energy: the motion is not to be trusted; try --dt {:.3g}",
+                     100 * energy.band() / energy.scale(), options.step / 4);
+}
+
+std::string run_summary(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
+  const Model& model = simulation.model();
+  const Options& options = simulation.options();
+  std::string text;
+  const auto row = [&](const char* label, const std::string& value) { text += fmt::format("{:<11} {}\n", label, value); };
+
+  row("model", model_text(arguments, model));
+  row("start", begin_text(arguments, figures));
+  const Effects effects = arguments.effects();
+  std::string label = "effects";
+  for (const EffectLine& line : effect_lines(effects, model)) {
+    row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
+    label.clear();
+  }
+  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) {
+    row("ignored", left_out + "; a scene can name them");
+  }
+  row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), order_text(options),
+                            options.step, options.tolerance, name(options.stop), name(options.guess), gravity_text(options)));
+  if (figures.steps == 0) return text;
+
+  const double simulated = figures.simulated(options.step);
+  row("run", figures.complete()
+                 ? fmt::format("{:.6g} s, {}", simulated, counted(figures.steps, "step"))
+                 : fmt::format("{:.6g} of {:.6g} s, {} of {}", simulated, static_cast<double>(figures.steps_planned) * options.step,
+                               grouped(figures.steps), counted(figures.steps_planned, "step")));
+  row("speed", fmt::format("{} steps/s, {:.0f} ns per body and step, {:.3g} times real time",
+                           grouped(std::llround(steps_per_second(figures))), ns_per_body_step(model, figures),
+                           simulated / figures.step_seconds));
+  row("iterations", fmt::format("mean {:.2f}, largest {}; {:.2f} evaluations of the residual per step",
+                                mean(figures.iterations, figures.steps), figures.most_iterations,
+                                mean(figures.evaluations, figures.steps)));
+  if (figures.split_steps > 0) {
+    row("", fmt::format("{} {} split, {} sub-steps in all: a smaller --dt keeps energy better", counted(figures.split_steps, "step"),
+                        plural(figures.split_steps, "was", "were"), grouped(figures.substeps)));
+  }
+  if (figures.floor_steps > 0) {
+    row("", fmt::format("{} stopped above the tolerance, where rounding lets the residual fall no further (largest {:.1e})",
+                        counted(figures.floor_steps, "step"), figures.largest_residual));
+  }
+
+  const EnergyDrift& energy = figures.energy;
+  row("energy", fmt::format("{:.6g} J at the start; kinetic energy up to {:.4g} J", energy.initial(), energy.scale()));
+  if (!effect_lines(effects, model).empty()) {
+    row("  work", fmt::format("effects took {:.6g} J and gave {:.6g} J, which the band below accounts for", figures.taken, figures.given));
+  }
+  const bool scaled = energy.scale() > 0;
+  row("  band", fmt::format("{:.2e} J{}", energy.band(),
+                            scaled ? fmt::format(" = {:.2e} of the largest kinetic energy", energy.band() / energy.scale()) : ""));
+  if (std::isfinite(energy.slope_error())) {
+    row("  slope", fmt::format("{:+.1e} \u00b1 {:.1e} J/s{}", energy.slope(), energy.slope_error(),
+                               scaled ? fmt::format(" = {:+.1e} \u00b1 {:.1e} of it per second", energy.slope() / energy.scale(),
+                                                    energy.slope_error() / energy.scale())
+                                      : ""));
+  }
+  if (figures.momentum) {
+    const MomentumDrift& momentum = *figures.momentum;
+    row("momentum", momentum.gravity()
+                        ? fmt::format("P - m g t drifts by {:.1e}, L along gravity by {:.1e}, of the most the energy allows",
+                                      momentum.linear(), momentum.angular())
+                        : fmt::format("linear drifts by {:.1e}, angular by {:.1e}, of the most the energy allows", momentum.linear(),
+                                      momentum.angular()));
+  }
+  const auto written = [&](const std::string& file, const std::string& what) {
+    if (!file.empty()) row("", printable(fmt::format("{}: {}", file, what)));
+  };
+  written(arguments.record, fmt::format("{} rows", grouped(energy.samples())));
+  return text;
+}
+
+nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
+  const Model& model = simulation.model();
+  const Options& options = simulation.options();
+  const auto random = randomness(arguments);
+  const bool ran = figures.steps > 0;
+  const bool isolated = figures.momentum && !figures.momentum->gravity();
+  using Json = nlohmann::ordered_json;
+  const auto if_any = [](bool any, double value) { return any && std::isfinite(value) ? Json(value) : Json(nullptr); };
+  const auto if_given = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
+  const Effects effects = arguments.effects();
+  const LeftOut left_out(model, effects);
+  Json effect_list = Json::array();
+  for (const EffectLine& line : effect_lines(effects, model)) {
+    effect_list.push_back({{"name", line.name}, {"on", line.where}, {"what", line.what}});
+  }
+  const EnergyDrift& energy = figures.energy;
+  return Json{
+      {"command", "run"},
+      {"version", kVersion},
+      {"model", model.names.model},
+      {"source", arguments.model},
+      {"base", base_of(model)},
+      {"bodies", model.tree.bodies()},
+      {"dofs", model.degrees_of_freedom()},
+      {"positions", model.tree.shape.positions},
+      {"velocities", model.tree.shape.velocities},
+      {"mass", model.constants.subtree_mass(0)},
+      {"ignored", {{"limits", left_out.limits}, {"damping", left_out.damping}, {"friction", left_out.friction}}},
+      {"effects", effect_list},
+      {"solver", name(options.solver)},
+      {"guess", name(options.guess)},
+      {"stop", name(options.stop)},
+      {"tolerance", options.tolerance},
+      {"order", options.order},
+      {"step", options.step},
+      {"gravity", options.gravity},
+      {"seed", random ? Json(random->seed) : Json(nullptr)},
+      {"spread", random ? Json(random->spread) : Json(nullptr)},
+      {"loaded", if_given(arguments.load)},
+      {"time_begin", figures.begin},
+      {"duration", figures.simulated(options.step)},
+      {"steps_planned", figures.steps_planned},
+      {"steps", figures.steps},
+      {"wall_seconds", figures.step_seconds},
+      {"total_seconds", figures.total_seconds},
+      {"steps_per_second", if_any(ran, steps_per_second(figures))},
+      {"ns_per_body_step", if_any(ran, ns_per_body_step(model, figures))},
+      {"real_time_factor", if_any(ran, figures.simulated(options.step) / figures.step_seconds)},
+      {"iterations_mean", if_any(ran, mean(figures.iterations, figures.steps))},
+      {"iterations_max", figures.most_iterations},
+      {"evaluations_mean", if_any(ran, mean(figures.evaluations, figures.steps))},
+      {"factorisations_mean", if_any(ran, mean(figures.factorisations, figures.steps))},
+      {"substeps", figures.substeps},
+      {"split_steps", figures.split_steps},
+      {"rounding_floor_steps", figures.floor_steps},
+      {"residual_max", figures.largest_residual},
+      {"energy_initial", energy.initial()},
+      {"energy_taken", figures.taken},
+      {"energy_given", figures.given},
+      {"energy_band", energy.band()},
+      {"energy_slope", if_any(true, energy.slope())},
+      {"energy_slope_error", if_any(true, energy.slope_error())},
+      {"energy_scale", energy.scale()},
+      {"energy_scale_is", "largest kinetic energy"},
+      {"energy_samples", energy.samples()},
+      {"energy_sampled_every", figures.sampled_every},
+      {"momentum_drift", if_any(isolated, isolated ? std::max(figures.momentum->linear(), figures.momentum->angular()) : 0)},
+      {"momentum_drift_linear", if_any(figures.momentum.has_value(), figures.momentum ? figures.momentum->linear() : 0)},
+      {"momentum_drift_angular", if_any(figures.momentum.has_value(), figures.momentum ? figures.momentum->angular() : 0)},
+      {"momentum_drift_is", !figures.momentum ? Json(nullptr)
+                            : isolated        ? Json("linear and angular momentum")
+                                              : Json("P - m g t, and angular momentum along gravity")},
+      {"failures", figures.failure.empty() ? 0 : 1},
+      {"failure", if_given(figures.failure)},
+      {"interrupted", figures.signal != 0},
+      {"advice", if_given(energy_advice(options, energy))},
+      {"warnings", model.warnings},
+  };
+}
+
+plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
+  const Options& options = simulation.options();
+  const EnergyDrift& energy = figures.energy;
+  const bool scaled = energy.scale() > 0;
+  plot::Series curve{.label = "", .x = {}, .y = {}};
+  for (const plot::Point& point : figures.trace) {
+    curve.x.push_back(point.x);
+    curve.y.push_back(scaled ? point.y / energy.scale() : point.y);
+  }
+  plot::Chart chart;
+  chart.title = fmt::format("Energy drift of {}", printable(simulation.model().names.model));
+  chart.subtitle = fmt::format("{}, {}; {}, {}step {:g} s, {}, {}; start {}; H(0) = {:.6g} J",
+                               counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
+                               order_text(options), options.step, counted(figures.steps, "step"), gravity_text(options), begin_text(arguments, figures),
+                               energy.initial());
+  chart.x.label = "time [s]";
+  const bool effects = !effect_lines(arguments.effects(), simulation.model()).empty();
+  const char* drift = effects ? "H \u2212 H(0) \u2212 work of effects" : "H \u2212 H(0)";
+  chart.y.label = scaled ? fmt::format("{}, share of the largest kinetic energy ({:.4g} J)", drift, energy.scale())
+                         : fmt::format("{} [J]", drift);
+  chart.series.push_back(std::move(curve));
+  return chart;
+}
+
+}  // namespace linden

@@ -1,0 +1,45 @@
+// engine/program/run_report.hpp
+// What a run was and how it went: for people, for scripts, as a picture.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/drift.hpp"
+#include "engine/program/plot.hpp"
+#include "engine/program/run_command.hpp"
+
+namespace linden {
+
+/// Counted while a run goes on.
+struct RunFigures {
+  std::int64_t steps_planned = 0, steps = 0;
+  std::int64_t sampled_every = 1;  // steps between samples of energy and momentum
+  double begin = 0;                // time at the first sample [s]
+  double step_seconds = 0;         // by the clock, within Simulation::step
+  double total_seconds = 0;        // by the clock, everything
+  std::int64_t iterations = 0, evaluations = 0, factorisations = 0, substeps = 0;
+  int most_iterations = 0;
+  std::int64_t split_steps = 0, floor_steps = 0;
+  double largest_residual = 0;
+  EnergyDrift energy;          // of H plus what effects took less what they gave
+  double taken = 0, given = 0;  // by effects since the first sample [J]
+  std::optional<MomentumDrift> momentum;
+  std::vector<plot::Point> trace;  // drift of that energy [J] over time, for the picture
+  std::string failure;             // what Simulation::describe says of the step that failed
+  int signal = 0;                  // that ended the run
+
+  bool complete() const { return failure.empty() && signal == 0; }
+  double simulated(double step) const { return static_cast<double>(steps) * step; }
+};
+
+/// What to say of a run whose energy strays so far that the motion cannot be trusted; empty for others.
+std::string energy_advice(const Options& options, const EnergyDrift& energy);
+
+std::string run_summary(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
+nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
+plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
+
+}  // namespace linden

@@ -1,0 +1,88 @@
+#include "engine/scene/load_model.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <string_view>
+
+#include "engine/scene/scene_file.hpp"
+#include "engine/text.hpp"
+#include "models/generators.hpp"
+
+namespace linden {
+namespace {
+
+struct Roots {
+  Index all = 0, free = 0;
+};
+
+Roots roots_of(const Model& model) {
+  Roots roots;
+  for (const Index root : model.tree.roots()) {
+    roots.all += 1;
+    roots.free += model.tree.kind(root) == JointKind::free ? 1 : 0;
+  }
+  return roots;
+}
+
+}  // namespace
+
+void require_memory(const std::string& what, double bytes) {
+  const double present = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
+  if (present <= 0 || bytes <= present) return;
+  constexpr double kMost = 1e18;
+  throw InputError(fmt::format("{} {} about {} of memory; expected no more than the {} of this machine; choose fewer or a smaller one", what,
+                               what.find(' ') == what.npos ? "needs" : "need",
+                               memory_text(static_cast<std::size_t>(std::min(bytes, kMost))),
+                               memory_text(static_cast<std::size_t>(present))));
+}
+
+double memory_of(const std::string& name) {
+  constexpr double kBytesPerBody = 2600;  // of building and simulating chain:1000000
+  const std::string_view count = std::string_view(name).substr(name.find(':') + 1);
+  double bodies = 0;
+  std::from_chars(count.data(), count.data() + count.size(), bodies);
+  if (name.starts_with("humanoids:")) bodies *= kHumanoidBodies;
+  return std::isnan(bodies) ? 0 : bodies * kBytesPerBody;
+}
+
+void check_memory(const std::string& name) { require_memory(name, memory_of(name)); }
+
+Base base_from(const std::string& text) {
+  if (text == "fixed") return Base::fixed;
+  if (text == "floating") return Base::floating;
+  throw InputError(fmt::format("--base \"{}\" is not known; choose one of: fixed, floating", text));
+}
+
+Model load_model(const std::string& name, std::optional<Base> base) {
+  if (is_scene(name)) {
+    throw InputError(
+        fmt::format("{}: scenes are for linden run, rollout, accuracy and inspect; expected a model here; give a URDF file or chain:3", name));
+  }
+  if (!is_generated(name)) return load_urdf(name, base.value_or(Base::fixed));
+  if (base) throw InputError(fmt::format("--base is for URDF files; {} is generated, base and all: leave --base out", name));
+  check_memory(name);
+  return generate(name);
+}
+
+std::string base_of(const Model& model) {
+  const Roots roots = roots_of(model);
+  if (roots.free == 0) return "fixed base";
+  if (roots.free == roots.all) return roots.all == 1 ? "floating base" : fmt::format("{} floating roots", roots.all);
+  return fmt::format("{} of {} roots float", roots.free, roots.all);
+}
+
+void print_warnings(const Model& model) {
+  constexpr std::size_t kShown = 5;
+  for (std::size_t i = 0; i < std::min(kShown, model.warnings.size()); ++i) {
+    fmt::print(stderr, "linden: warning: {}\n", printable(model.warnings[i]));
+  }
+  if (model.warnings.size() > kShown) {
+    fmt::print(stderr, "linden: warning: and {} more (linden inspect shows all)\n", model.warnings.size() - kShown);
+  }
+}
+
+}  // namespace linden

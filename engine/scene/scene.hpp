@@ -1,0 +1,23 @@
+// engine/scene/scene.hpp
+// All that a simulation is: model, effects, start, how to step, for how long. A plain value, built in C++ or read from a YAML file.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/initial_state.hpp"
+#include "engine/options.hpp"
+#include "layout/effects.hpp"
+#include "layout/model.hpp"
+
+namespace linden {
+
+struct Scene {
+  Model model;
+  Options options;        // step, gravity, solver, tolerance
+  double duration = 10;   // [s]
+  InitialState initial;   // positions [nq], velocities [nv]; empty: at rest in the zero configuration
+  Effects effects;
+};
+
+}  // namespace linden

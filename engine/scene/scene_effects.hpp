@@ -1,0 +1,47 @@
+// engine/scene/scene_effects.hpp
+// A scene's key `effects`: from names and numbers to rows and slots. What is not named is not there.
+//
+//   gravity    [x, y, z]
+//   armature   number (every screw joint) | {joint: number}
+//   damping    urdf | number (every screw and ball joint) | {joint: number}
+//   friction   urdf | number (every screw joint) | {joint: number}
+//   spring     {joint: {stiffness, rest: number, or of a ball joint quaternion}}
+//   limits     urdf | {restitution} (all of the URDF's) | {joint: urdf | {lower, upper, restitution}}
+//   servo      {stiffness, damping, max_force: urdf | none | number, targets: {joint: number},
+//               joints: [joint, ...] | {joint: {stiffness, damping, target, max_force}}}
+//   torque     {joint: number | FILE.csv | {times, values}}
+//   wrench     {link: {force, moment, point, frame: world | body, from, to, file}, or a list of such}
+//   drag       {linear, quadratic, wind, bodies: {link: {linear, quadratic}}}
+//   ground     {normal, height, stiffness, damping, friction, terrain: {file, spacing, origin}}
+//
+// A servo acts on every screw joint; on those that `joints` names where it is a list, or a map without a `stiffness` beside it. Targets
+// are the positions at the start where none are given.
+// Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo and torque refuse it.
+// Free joints have none of these, ball joints damping and spring only. A link that is merged into another's body acts there.
+// CSV files are found relative to the scene: time,value a line for torque and wrench (there a share of force and moment).
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "engine/scene/scene_yaml.hpp"
+#include "layout/effects.hpp"
+#include "layout/model.hpp"
+
+namespace linden {
+
+struct SceneEffects {
+  Effects effects;
+  std::array<double, 3> gravity{};
+  std::vector<std::string> warnings;  // what was named and does nothing
+};
+
+/// Names of the effects that a scene can have.
+const std::vector<std::string>& effect_keys();
+
+/// `start`: positions [nq] that servos hold where no target is given; `folder`: of the scene, empty for the current one. Throws
+/// InputError with file and line.
+SceneEffects read_effects(const SceneValue& at, const Model& model, const std::vector<double>& start, const std::string& folder);
+
+}  // namespace linden

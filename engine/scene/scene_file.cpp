@@ -1,0 +1,236 @@
+#include "engine/scene/scene_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+#include <unordered_set>
+#include <utility>
+
+#include "engine/scene/load_model.hpp"
+#include "engine/scene/scene_effects.hpp"
+#include "engine/scene/scene_yaml.hpp"
+#include "layout/merged_models.hpp"
+#include "layout/text_file.hpp"
+#include "layout/words.hpp"
+#include "models/generators.hpp"
+
+namespace linden {
+namespace {
+
+using Kind = SceneValue::Kind;
+
+const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
+                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "effects"};
+const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
+                                      "rotation", "quaternion", "velocity", "angular_velocity"};
+const std::vector<std::string> kBases{"fixed", "floating"};
+constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
+
+/// A model of the list `models`.
+struct Entrant {
+  SceneValue at;
+  PlacedModel placed;
+  BaseStart base;
+};
+
+class SceneReader {
+ public:
+  SceneReader(const SceneYaml& yaml, const SceneStart& given)
+      : root_(yaml.root()), given_(given), file_(yaml.file()), folder_(std::filesystem::path(file_).parent_path().string()) {}
+
+  Scene read() {
+    root_.entries_of(kScene, effect_keys(), "effects");
+    read_model();
+    read_options();
+    const auto initial = root_.find("initial");
+    scene_.initial = read_start(initial, scene_.model, bases_, given_);
+    require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
+    require_finite(initial.value_or(root_), "velocity", scene_.initial.velocities, scene_.model.names.velocity);
+    scene_.options.gravity = {};
+    if (const auto effects = root_.find("effects")) {
+      SceneEffects read = read_effects(*effects, scene_.model, scene_.initial.positions, folder_);
+      scene_.effects = std::move(read.effects);
+      scene_.options.gravity = read.gravity;
+      std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
+    }
+    return std::move(scene_);
+  }
+
+ private:
+  void read_model() {
+    const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base");
+    if (one && several) several->fail("model and models are both given", "one of them", "move the model into the list models");
+    if (!one && !several)
+      root_.fail("the scene has no model", "model: and a URDF file, or a generated one such as chain:3", "add it");
+    if (one) {
+      scene_.model = load(*one, base);
+      return;
+    }
+    if (base) base->fail("base stands beside models", "base beside each model of the list", "move it there");
+    read_models(*several);
+  }
+
+  /// What is finite number by number may come to more: by a large spread, a turned frame, a leader's position times a multiplier.
+  static void require_finite(const SceneValue& at, const char* what, const std::vector<double>& values,
+                             const std::vector<std::string>& names) {
+    for (std::size_t row = 0; row < values.size(); ++row) {
+      if (std::isfinite(values[row])) continue;
+      at.fail(fmt::format("the {} {} is {} at the start", what, linden::quoted(names[row]), values[row]), "finite numbers",
+              "choose smaller ones, or a smaller spread");
+    }
+  }
+
+  Model load(const SceneValue& at, const std::optional<SceneValue>& base) const {
+    const std::string& name = at.text(kAModel);
+    const std::optional<Base> root =
+        base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
+    if (is_generated(name)) {
+      if (base) base->fail(fmt::format("base, but {} is generated, base and all", name), "it beside a URDF file", "leave it out");
+      return at.located([&] {
+        check_memory(name);
+        return generate(name);
+      });
+    }
+    if (is_scene(name)) at.refuse(kAModel, "a scene holds models, not scenes");
+    const std::string file = (std::filesystem::path(folder_) / name).string();
+    std::error_code ignored;
+    if (!std::filesystem::exists(file, ignored)) {
+      at.fail(fmt::format("{}: there is no file {}", at.path(), linden::quoted(file)), "a URDF file, found relative to the scene",
+              "check the path; a generated model is written chain:3");
+    }
+    return load_urdf(file, root.value_or(Base::fixed));
+  }
+
+  void read_models(const SceneValue& at) {
+    std::vector<Entrant> entrants;
+    const std::vector<SceneValue> items = at.list("models, {model: FILE.urdf, name: ..., position: [x, y, z]}");
+    at.located([&] { require_memory("all of them", memory_of_generated(items)); });
+    for (const SceneValue& item : items) {
+      item.entries_of(kModel);
+      const auto model = item.find("model");
+      if (!model)
+        item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3",
+                  "add it");
+      entrants.push_back({item, {load(*model, item.find("base")), "", Pose::Identity()}, read_base(item)});
+      const auto name = item.find("name");
+      if (name) entrants.back().placed.name = name->text("a name");
+    }
+    if (entrants.empty()) at.refuse("a list of models", "add one");
+    give_names(entrants);
+    std::vector<PlacedModel> parts;
+    for (Entrant& entrant : entrants) {
+      place(entrant);
+      parts.push_back(std::move(entrant.placed));
+    }
+    scene_.model = at.located([&] { return merged(parts, std::filesystem::path(file_).stem().string()); });
+    for (const Entrant& entrant : entrants) remember_bases(entrant, parts[static_cast<std::size_t>(&entrant - entrants.data())]);
+  }
+
+  /// Of all generated models together.
+  static double memory_of_generated(const std::vector<SceneValue>& items) {
+    double bytes = 0;
+    for (const SceneValue& item : items) {
+      const auto model = item.find("model");
+      if (!model || !model->is(Kind::text)) continue;
+      const std::string& name = model->text(kAModel);
+      if (is_generated(name)) bytes += memory_of(name);
+    }
+    return bytes;
+  }
+
+  /// Several models need a name each: the one they are given, or their own.
+  static void give_names(std::vector<Entrant>& entrants) {
+    if (entrants.size() == 1) return;
+    std::unordered_set<std::string> seen;
+    for (Entrant& entrant : entrants) {
+      std::string& name = entrant.placed.name;
+      if (name.empty()) name = entrant.placed.model.names.model;
+      if (!seen.insert(name).second) {
+        entrant.at.fail(fmt::format("two models are called {}", linden::quoted(name)), "a name of its own for each",
+                        "write name: beside them");
+      }
+    }
+  }
+
+  /// Where every root floats the pose is a start, not part of the model.
+  static void place(Entrant& entrant) {
+    const Model& model = entrant.placed.model;
+    const std::size_t free = floating_roots(model).size();
+    if (free == 0 && (entrant.base.velocity || entrant.base.angular_velocity)) {
+      entrant.at.fail(fmt::format("{} has a velocity, but its base is fixed", entrant.at.path()), "a floating base",
+                      "write base: floating, or leave it out");
+    }
+    if (free == 0 || free < model.tree.roots().size()) entrant.placed.pose = entrant.base.pose();
+  }
+
+  void remember_bases(const Entrant& entrant, const PlacedModel& part) {
+    const bool moved = floating_roots(part.model).size() < part.model.tree.roots().size();
+    for (const Index slot : floating_roots(part.model)) {
+      const std::string& joint = part.model.names.joint[static_cast<std::size_t>(slot)];
+      BaseStart start = entrant.base;
+      if (moved) start.position.reset(), start.rotation.reset();
+      bases_.push_back({scene_.model.names.slot_of_joint.at(part.name.empty() ? joint : part.name + "/" + joint), start});
+    }
+  }
+
+  void read_options() {
+    Options& options = scene_.options;
+    bool tolerance = false;
+    for (const auto& [key, value] : root_.entries("a scene")) {
+      if (key == "step") options.step = value.positive();
+      if (key == "duration") scene_.duration = value.positive();
+      if (key == "tolerance") {
+        options.tolerance = value.positive();
+        tolerance = true;
+      }
+      if (key == "solver") options.solver = solver_from(value.choice(names_of({Solver::newton, Solver::riqn})));
+      if (key == "guess") {
+        options.guess =
+            guess_from(value.choice(names_of({FirstGuess::extrapolation, FirstGuess::ig1, FirstGuess::ig2, FirstGuess::ig3})));
+      }
+      if (key == "stop") options.stop = stop_from(value.choice(names_of({StopTest::energy, StopTest::absolute})));
+      if (key == "max_iterations") options.max_iterations = value.integer(0, 1'000'000);
+      if (key == "max_splits") options.max_splits = value.integer(0, 20);
+      if (key == "order") {
+        options.order = value.integer(2, 8);
+        if (options.order % 2 != 0) value.refuse("2, 4, 6 or 8", "odd orders do not exist");
+      }
+    }
+    if (!tolerance) options.tolerance = default_tolerance(options.order);
+    if (scene_.duration < options.step) {
+      root_.fail(fmt::format("a duration of {} s is less than a step of {} s", scene_.duration, options.step), "one step or more",
+                 "change one of them");
+    }
+  }
+
+  template <class Choice>
+  static std::vector<std::string> names_of(std::initializer_list<Choice> choices) {
+    std::vector<std::string> names;
+    for (const Choice choice : choices) names.emplace_back(name(choice));
+    return names;
+  }
+
+  SceneValue root_;
+  SceneStart given_;
+  std::string file_, folder_;
+  Scene scene_;
+  std::vector<PlacedBase> bases_;
+};
+
+}  // namespace
+
+bool is_scene(const std::string& file) { return file.ends_with(".yaml") || file.ends_with(".yml"); }
+
+Scene load_scene(const std::string& file, const SceneStart& given) {
+  return parse_scene(read_text(file, "a scene", SceneYaml::kMostBytes), file, given);
+}
+
+Scene parse_scene(const std::string& text, const std::string& file, const SceneStart& given) {
+  const SceneYaml yaml(text, file);
+  return SceneReader(yaml, given).read();
+}
+
+}  // namespace linden

@@ -1,0 +1,42 @@
+// engine/scene/scene_file.hpp
+// Scenes as YAML files: model, base, start, step, duration, solver and effects.
+//
+//   model: humanoid.urdf       # a URDF file, found relative to the scene, or chain:N and its like
+//   base: floating
+//   duration: 10
+//   initial: {base: {position: [0, 0, 1.2]}, positions: {left_elbow: 0.4}}
+//   effects:
+//     gravity: [0, 0, -9.81]
+//     damping: urdf
+//
+//   model | models   one of them. models: a list of {model, base, name, position, rotation or quaternion, velocity,
+//                    angular_velocity}; several are one system, links and joints of each called name/link and name/joint, where
+//                    the name is the model's own unless it is given
+//   base             fixed (default) or floating, for a URDF file
+//   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; where no
+//                    tolerance is given it goes with the order
+//   initial          engine/scene/scene_start.hpp
+//   effects          engine/scene/scene_effects.hpp; gravity is one of them: without its key there is none
+//
+// A floating model starts at its position and rotation, a fixed one sits there.
+// Whatever is wrong - a key or a name that is not known, a value of the wrong kind or one that makes no sense - throws InputError
+// with file, line and advice.
+#pragma once
+
+#include <string>
+
+#include "engine/scene/scene.hpp"
+#include "engine/scene/scene_start.hpp"
+
+namespace linden {
+
+/// Whether the name is that of a scene: it ends in .yaml or .yml.
+bool is_scene(const std::string& file);
+
+/// Reads a scene; what could be named and does nothing is in its model's warnings. `given` goes over what the scene says.
+Scene load_scene(const std::string& file, const SceneStart& given = {});
+
+/// The same from memory; `file` stands for the source, and the files that the scene names are found relative to it.
+Scene parse_scene(const std::string& text, const std::string& file, const SceneStart& given = {});
+
+}  // namespace linden

@@ -1,0 +1,51 @@
+// engine/scene/scene_start.hpp
+// Where a scene's motion begins: its key `initial`, and the poses of floating models.
+//
+//   base       {position, rotation: [roll, pitch, yaw] or quaternion: [x, y, z, w], velocity, angular_velocity} of the one floating
+//              base, all in the world's frame
+//   positions  {joint: number, or of a ball joint quaternion}
+//   velocities {joint: number, or of a ball joint three, in the body's frame}
+//   seed, spread  start from random positions and speeds (engine/initial_state.hpp); what is named above goes over them
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+
+#include "engine/initial_state.hpp"
+#include "engine/scene/scene_yaml.hpp"
+
+namespace linden {
+
+/// What a command line may say instead of the scene.
+struct SceneStart {
+  std::optional<std::uint64_t> seed;
+  std::optional<double> spread;
+};
+
+/// Pose and velocity of a base in the world, as far as they are given.
+struct BaseStart {
+  std::optional<Eigen::Vector3d> position;
+  std::optional<Eigen::Quaternion<double, Eigen::DontAlign>> rotation;
+  std::optional<Eigen::Vector3d> velocity, angular_velocity;
+
+  Pose pose() const;
+};
+
+/// Reads what there is of the keys of a base.
+BaseStart read_base(const SceneValue& at);
+
+/// A root on a free joint that a scene puts somewhere.
+struct PlacedBase {
+  Index slot;
+  BaseStart start;
+};
+
+/// Slots of the free joints that hang on the world.
+std::vector<Index> floating_roots(const Model& model);
+
+/// `at`: the scene's `initial`, where it has one. Throws InputError with file and line.
+InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
+                        const SceneStart& given);
+
+}  // namespace linden

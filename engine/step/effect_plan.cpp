@@ -1,0 +1,139 @@
+#include "engine/step/effect_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "kernels/articulated_inertia_up.hpp"
+#include "kernels/placement_map.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kUsualGravity = 9.81;
+
+/// Share of the weight of all bodies that a contact point is taken to bear at least, where its friction is made to stick.
+constexpr double kLeastLoad = 1e-2;
+
+/// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included.
+std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>& rotors) {
+  const Tree& tree = model.tree;
+  Workspace<double> work;
+  work.allocate(tree.shape);
+  Field<double> q;
+  q.allocate(tree.shape.positions);
+  std::ranges::copy(model.neutral(), q.flat().begin());
+  placement_map(tree, model.constants, q, work.placement);
+  articulated_inertia_up(tree, model.constants, work.placement, work.articulated,
+                         Gains<double>{work.gain_up, work.gain_down, work.joint_inverse});
+  std::vector<double> felt(static_cast<std::size_t>(tree.shape.velocities));
+  for (Index i = 1; i < tree.shape.slots; ++i) {
+    const Index n = velocity_count(tree.kind(i));
+    for (Index k = 0; k < n; ++k) {
+      felt[static_cast<std::size_t>(tree.first_v(i) + k)] = 1 / work.joint_inverse(tree.first_block(i) + k * n + k);
+    }
+  }
+  for (const Armature& rotor : rotors) felt[static_cast<std::size_t>(rotor.row)] += rotor.inertia;
+  return felt;
+}
+
+Mat3<double> plane_frame(const std::array<double, 3>& normal) {
+  const Vec3<double> z{normal[0], normal[1], normal[2]};
+  // the plane's x lies in the world's x-z plane where that is possible
+  const Vec3<double> helper = std::abs(z.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0};
+  const Vec3<double> across = helper - dot(helper, z) * z;
+  const Vec3<double> x = (1 / std::sqrt(dot(across, across))) * across;
+  return {x, cross(z, x), z};
+}
+
+std::vector<GroundPoint> points_of(const Contacts& contacts) {
+  std::vector<GroundPoint> points;
+  for (const ContactSphere& sphere : contacts.spheres) points.push_back({sphere.slot, sphere.center, sphere.radius, {}, 0, 0});
+  for (const ContactRim& rim : contacts.rims) {
+    for (int quarter = 0; quarter < 4; ++quarter) points.push_back({rim.slot, rim.center, 0, rim.axis, rim.radius, quarter});
+  }
+  std::ranges::stable_sort(points, {}, &GroundPoint::slot);
+  return points;
+}
+
+}  // namespace
+
+double share_at(const BodyWrench& wrench, double time) {
+  return time >= wrench.from && time < wrench.to ? wrench.scale.at(time) : 0;
+}
+
+EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
+  check(effects, model);
+  const double h = options.step;
+  const Tree& tree = model.tree;
+  std::ranges::stable_sort(effects.drag, {}, &Drag::slot);
+  std::ranges::stable_sort(effects.wrenches, {}, &BodyWrench::slot);
+  if (effects.ground) {
+    ground.ground = *effects.ground;
+    ground.points = points_of(effects.ground->contacts);
+  }
+  const std::vector<GroundPoint>& points = ground.points;
+
+  bodies = !effects.drag.empty() || !effects.wrenches.empty() || !points.empty();
+  joints = !effects.armature.empty() || !effects.springs.empty() || !effects.ball_springs.empty() || !effects.damping.empty() ||
+           !effects.friction.empty() || !effects.limits.empty() || !effects.servos.empty() || !effects.torques.empty();
+  springs = !effects.springs.empty() || !effects.ball_springs.empty() || !points.empty();
+  balls = !effects.ball_springs.empty() || std::ranges::any_of(effects.damping, [&](const JointDamping& damper) {
+    return std::ranges::none_of(tree.runs, [&](const Run& run) {
+      return run.kind == JointKind::screw && damper.row >= tree.first_v(run.begin) && damper.row <= tree.first_v(run.end - 1);
+    });
+  });
+  revises = !effects.friction.empty() || !effects.limits.empty() || !points.empty() ||
+            std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
+
+  if (joints) {
+    q_row.allocate(tree.shape.velocities, -1);
+    for (Index i = 1; i < tree.shape.slots; ++i) {
+      if (tree.kind(i) == JointKind::screw) q_row(tree.first_v(i)) = tree.first_q(i);
+    }
+  }
+  if (!effects.armature.empty()) {
+    rotor.allocate(tree.shape.velocities);
+    for (const Armature& one : effects.armature) rotor(one.row) += one.inertia;
+  }
+  if (!effects.damping.empty() || !effects.servos.empty()) {
+    const std::vector<double> felt = felt_inertia(model, effects.armature);
+    const auto inertia = [&](Index row) { return felt[static_cast<std::size_t>(row)]; };
+    for (const JointDamping& damper : effects.damping) damping_share.push_back(begin_share(h * damper.coefficient / inertia(damper.row)));
+    for (const Servo& servo : effects.servos) {
+      servo_share.push_back(begin_share((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row)));
+    }
+  }
+  const auto mass = [&](Index slot) {
+    const double own = model.constants.inertia(slot, 0);
+    return own > 0 ? own : model.constants.subtree_mass(slot);
+  };
+  for (const Drag& one : effects.drag) {
+    // a falling body reaches sqrt(m g / b2) at most
+    drag_share.push_back(begin_share(h * (one.linear / mass(one.slot) + std::sqrt(one.quadratic * kUsualGravity / mass(one.slot)))));
+  }
+  if (!points.empty()) {
+    const auto& g = options.gravity;
+    const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    ground.frame = plane_frame(effects.ground->normal);
+    ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
+    for (const GroundPoint& point : points) ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass(point.slot)));
+  }
+
+  std::map<Index, TouchedBody> by_slot;
+  const auto collect = [&](const auto& list, TouchedBody::Entries TouchedBody::*entries) {
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      TouchedBody& body = by_slot[list[k].slot];
+      body.slot = list[k].slot;
+      if ((body.*entries).last == 0) (body.*entries).first = k;
+      (body.*entries).last = k + 1;
+    }
+  };
+  collect(effects.drag, &TouchedBody::drag);
+  collect(effects.wrenches, &TouchedBody::wrenches);
+  collect(points, &TouchedBody::points);
+  for (const auto& [slot, body] : by_slot) touched.push_back(body);
+}
+
+}  // namespace linden

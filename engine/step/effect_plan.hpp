@@ -1,0 +1,60 @@
+// engine/step/effect_plan.hpp
+// The effects of a scene made ready for its steps: sorted by the bodies they touch, with the numbers that do not change. Shared by
+// all steppers; what changes within a step is in engine/step/effect_sweeps.hpp.
+//
+// An effect that the scene does not name has no entry here, no memory in the sweeps and no call in a step.
+#pragma once
+
+#include <type_traits>
+#include <vector>
+
+#include "engine/options.hpp"
+#include "kernels/effects/ground.hpp"
+#include "layout/effects.hpp"
+#include "layout/model.hpp"
+
+namespace linden {
+
+/// Entries of every effect on one body: [first, last) of its list.
+struct TouchedBody {
+  struct Entries {
+    std::size_t first = 0, last = 0;
+  };
+  Index slot = 0;
+  Entries drag, wrenches, points;
+};
+
+/// What of a wrench acts at a time.
+double share_at(const BodyWrench& wrench, double time);
+
+struct EffectPlan {
+  /// Throws InputError for effects that make no sense for the model.
+  EffectPlan(const Model& model, const Options& options, const Effects& effects);
+
+  Effects effects;
+  bool joints = false;   // some effect acts on joints
+  bool bodies = false;   // on bodies
+  bool springs = false;  // some potential beside gravity's
+  bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
+  bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
+  bool any() const { return joints || bodies; }
+
+  Field<Index> q_row;               // position row of a screw's velocity row
+  std::vector<double> damping_share, servo_share, drag_share;
+  Field<double> rotor;              // armature of every row; no rows without armature
+  GroundPlan ground;                // no points without ground
+  std::vector<TouchedBody> touched;  // sorted by slot
+};
+
+/// action(std::true_type) where there is any effect, else action(std::false_type). What steps is compiled for each apart, so that a step
+/// without effects is the same to the last instruction whether there are any elsewhere or not; bench/pay_as_you_go counts them beside those
+/// of a linden that has none.
+template <class Action>
+auto with_or_without([[maybe_unused]] const EffectPlan& plan, const Action& action) {
+#ifndef LINDEN_WITHOUT_EFFECTS
+  if (plan.any()) return action(std::true_type{});
+#endif
+  return action(std::false_type{});
+}
+
+}  // namespace linden

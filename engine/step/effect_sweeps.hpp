@@ -1,0 +1,429 @@
+// engine/step/effect_sweeps.hpp
+// The effects of a scene within a step: what they keep while it is solved, and when their kernels are called.
+//
+//   begin            tables at the middle of the step's time; states (sticks? at its limit?) as the first guess suggests
+//   +-> bodies       forces on bodies, after their momenta are known                 once an evaluation
+//   |   joints       impulses of joints into the target of the residual              once an evaluation
+//   |   revise       states that belong to the solution so far: did one change?      where some effect has states
+//   +-- until none changes and the residual is small
+//   end              impulses of the end of the step, work of each effect
+//
+// S is double, or a pack of W instances.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+#include "engine/step/effect_plan.hpp"
+#include "kernels/effects/armature.hpp"
+#include "kernels/effects/ball_spring.hpp"
+#include "kernels/effects/damping.hpp"
+#include "kernels/effects/drag.hpp"
+#include "kernels/effects/friction.hpp"
+#include "kernels/effects/ground.hpp"
+#include "kernels/effects/limits.hpp"
+#include "kernels/effects/servo.hpp"
+#include "kernels/effects/spring.hpp"
+#include "kernels/effects/torque.hpp"
+#include "kernels/effects/wrench.hpp"
+#include "kernels/impulse_up.hpp"
+#include "kernels/world_placement_down.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+
+/// What effects gave (driving ones) or took (losses) [J].
+#define LINDEN_EFFECT_WORK(FIELD)     \
+  FIELD(damping, "taken")             \
+  FIELD(friction, "taken")            \
+  FIELD(limits, "taken")              \
+  FIELD(servo, "given")               \
+  FIELD(torque, "given")              \
+  FIELD(wrench, "given")              \
+  FIELD(drag, "taken")                \
+  FIELD(ground, "taken")
+
+template <class S>
+struct EffectWork {
+#define LINDEN_MEMBER(name, sense) S name = S(0.0);
+  LINDEN_EFFECT_WORK(LINDEN_MEMBER)
+#undef LINDEN_MEMBER
+
+  void add(const EffectWork& more) {
+#define LINDEN_ADD(name, sense) name = name + more.name;
+    LINDEN_EFFECT_WORK(LINDEN_ADD)
+#undef LINDEN_ADD
+  }
+  S magnitude() const {
+    using std::abs;
+    S sum(0.0);
+#define LINDEN_MAGNITUDE(name, sense) sum = sum + abs(name);
+    LINDEN_EFFECT_WORK(LINDEN_MAGNITUDE)
+#undef LINDEN_MAGNITUDE
+    return sum;
+  }
+  S given() const { return servo + torque + wrench; }
+  S taken() const { return damping + friction + limits + drag + ground; }
+};
+
+/// f of each number of a Scalar.
+template <class S, class Function>
+LINDEN_INLINE S in_each_lane(const S& x, const Function& f) {
+  if constexpr (std::is_arithmetic_v<S>) {
+    return static_cast<S>(f(static_cast<double>(x)));
+  } else {
+    using Real = typename ElementOf<S>::type;
+    std::array<Real, sizeof(S) / sizeof(Real)> each;
+    x.store_unaligned(each.data());
+    for (Real& number : each) number = static_cast<Real>(f(static_cast<double>(number)));
+    return S::load_unaligned(each.data());
+  }
+}
+
+template <class S>
+class EffectSweeps {
+ public:
+  EffectSweeps(const EffectPlan& plan, const Model& model) : plan_(plan), tree_(model.tree) {
+    const Effects& effects = plan.effects;
+    const auto rows = [](Field<S>& field, std::size_t count) { field.allocate(static_cast<Index>(count)); };
+    if (plan.joints || !std::is_arithmetic_v<S>) sum_.allocate(tree_.shape);  // factors of blocks add both
+    if (plan.joints) {
+      last_.allocate(tree_.shape.velocities);
+      even_.allocate(tree_.shape.velocities);
+      rows(force_, effects.torques.size());
+      servos_.entries = effects.servos;
+      servos_.share = plan.servo_share;
+      rows(servos_.mode, effects.servos.size());
+      rows(servos_.target, effects.servos.size());
+      for (std::size_t k = 0; k < effects.servos.size(); ++k) servos_.target(static_cast<Index>(k)) = as<S>(effects.servos[k].target);
+      frictions_.entries = effects.friction;
+      rows(frictions_.mode, effects.friction.size());
+      rows(frictions_.force, effects.friction.size());
+      for (std::size_t k = 0; k < effects.friction.size(); ++k) {
+        frictions_.force(static_cast<Index>(k)) = as<S>(effects.friction[k].force);
+      }
+      limits_.entries = effects.limits;
+      for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
+    }
+    if (plan.rotor.rows() > 0) {
+      rotors_.allocate(plan.rotor.rows());
+      for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
+    }
+    if (plan.bodies) {
+      bodies_.allocate(tree_.shape);
+      clear_bodies();
+      points_.allocate({.slots = static_cast<Index>(plan.ground.points.size())});
+      drags_.entries = effects.drag;
+      drags_.share = plan.drag_share;
+      drags_.wind = {effects.wind[0], effects.wind[1], effects.wind[2]};
+      rows(drags_.loss, effects.drag.size());
+      wrenches_.entries = effects.wrenches;
+      rows(wrenches_.scale, effects.wrenches.size());
+      rows(wrenches_.work, effects.wrenches.size());
+    }
+  }
+  EffectSweeps(const EffectSweeps&) = delete;
+  EffectSweeps& operator=(const EffectSweeps&) = delete;
+
+  const EffectPlan& plan() const { return plan_; }
+  /// What joints are given, and bodies, for the factors.
+  const JointImpulses<S>& joint_sum() const { return sum_; }
+  const BodyImpulses<S>& body_sum() const { return bodies_; }
+  /// Armature of every row; no rows without.
+  const Field<S>& rotors() const { return rotors_; }
+  Index contacts() const { return points_.slides.rows(); }
+  /// Where momentum_target_map leaves the target that effects are taken from.
+  Field<S>& plain_target() { return sum_.plain_target; }
+  Field<S>& servo_targets() { return servos_.target; }
+  Field<S>& friction_forces() { return frictions_.force; }
+
+  /// After placements changed. Returns the potential energy of springs and of the ground at q [J].
+  S refresh(const Field<S, 12>& placement, const Field<S>& q) {
+    S potential(0.0);
+    if (plan_.bodies) {
+      world_placement_down(tree_, placement, bodies_.pose);
+      if (!plan_.ground.points.empty()) ground_potential_ = find_ground(plan_.ground, bodies_.pose, points_);
+      potential = potential + ground_potential_;
+    }
+    if (!plan_.effects.springs.empty()) potential = potential + spring_potential(plan_.effects.springs, plan_.q_row, q);
+    if (!plan_.effects.ball_springs.empty()) potential = potential + ball_spring_potential(plan_.effects.ball_springs, tree_, q);
+    return potential;
+  }
+
+  /// delta: the first guess, moved into the limits. past(row, k): displacement k steps before, where two are `known`.
+  template <class Past, class Mask>
+  void begin(const S& time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
+    h_ = h;
+    q_ = &q;
+    creep_ = 0;
+    ground_before_ = ground_potential_;
+    for (Index k = 0; k < wrenches_.scale.rows(); ++k) {
+      const BodyWrench& wrench = plan_.effects.wrenches[static_cast<std::size_t>(k)];
+      wrenches_.scale(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return share_at(wrench, t); });
+    }
+    if (!plan_.joints) return;
+    for (Index k = 0; k < force_.rows(); ++k) {
+      const JointTorque& torque = plan_.effects.torques[static_cast<std::size_t>(k)];
+      force_(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return torque.force.at(t); });
+    }
+    std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
+    begin_friction(frictions_, past, known, delta);
+    begin_limits(limits_, plan_.q_row, h, q, past, known, delta);
+    assemble();
+  }
+
+  /// Forces on bodies: impulse holds h mu.
+  template <class Element>
+  void bodies(const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    for (const TouchedBody& body : plan_.touched) {
+      clear_body(bodies_, body.slot);
+      drag_map(drags_, body.drag.first, body.drag.last, constants, h_, displacement, bodies_, impulse);
+      wrench_map(wrenches_, body.wrenches.first, body.wrenches.last, h_, displacement, bodies_, impulse);
+      ground_map(plan_.ground, body.points.first, body.points.last, h_, creep_, displacement, points_, bodies_, impulse);
+    }
+  }
+  /// Before the first of them: which points slide, as the first guess and the last step have it. `known`: that was one of these sweeps.
+  void guess_points(const Field<S, 7>& displacement, bool known) {
+    guess_ground(plan_.ground, h_, known, displacement, points_);
+    std::ranges::copy(points_.closed.flat(), points_.factored.flat().begin());
+  }
+
+  /// The target of the residual at delta.
+  void joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& target) const {
+    joint_impulses_map(sum_, delta, target);
+    if (!plan_.effects.ball_springs.empty()) ball_spring_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, target);
+  }
+
+  /// States that belong to the solution so far. `settled`: the residual is small, so that impulses that hold can be judged. delta is
+  /// changed where a joint comes to rest. Of what sticks too hard all start to slide, or, where `one_by_one`, that alone which does
+  /// most: slower, and hardly ever in a circle. Softly only limits have states to revise. Returns in which instances
+  /// something changed: the factor is out of date there.
+  template <class Mask>
+  auto revise(const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
+    using std::max;
+    auto changed = S(0.0) > S(1.0);
+    if (soft()) return revise_limits(limits_, residual, settled, delta);
+    S least(0.0);
+    if (any(one_by_one)) {
+      const S overload = max(friction_overload(frictions_, h_, residual), ground_overload(points_));
+      least = select(one_by_one, overload, least);
+    }
+    if (plan_.joints) {
+      changed = revise_servos(servos_, plan_.q_row, h_, *q_, delta);
+      changed = revise_friction(frictions_, h_, residual, settled, least, delta) || changed;
+      changed = revise_limits(limits_, residual, settled, delta) || changed;
+      if (any(changed)) assemble();
+    }
+    if (!plan_.ground.points.empty()) changed = revise_ground(points_, settled, least) || changed;
+    return changed;
+  }
+
+  /// What the next step wants to know of this one: where contact points stick and how they moved, and what velocities are read with.
+  auto memory() {
+    return std::array{points_.closed.flat(), points_.slides.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
+                      bodies_.last.flat(), bodies_.even.flat(), last_.flat(), even_.flat()};
+  }
+
+  /// The same of contact points alone, one number each: 0 apart, 1 sticks, 2 slides.
+  S contact(Index k) const { return points_.closed(k) * (S(1.0) + points_.slides(k)); }
+  void set_contact(Index k, const S& contact) {
+    points_.closed(k) = select(contact > S(0.5), S(1.0), S(0.0));
+    points_.slides(k) = select(contact > S(1.5), S(1.0), S(0.0));
+  }
+
+  /// Friction that is smooth up to this speed, until harden. joints() then goes by delta alone.
+  void soften(double creep, Field<S>& delta) {
+    if (soft()) shrink_friction(frictions_, creep / creep_, delta);
+    creep_ = creep;
+  }
+  /// Friction as it is again, from the states that the smooth one has led to.
+  void harden() {
+    creep_ = 0;
+    if (plan_.joints) assemble();
+  }
+  bool soft() const { return creep_ > 0; }
+  /// While soft: states by the value of delta.
+  void follow(const Field<S>& delta) {
+    revise_servos(servos_, plan_.q_row, h_, *q_, delta);
+    guess_friction(frictions_, h_, creep_, delta);
+    assemble();
+  }
+
+  /// Impulses of the beginning become those of the end, but for being seen from the new poses.
+  void end_bodies(const Field<S, 12>& placement, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    const S rate = S(1.0) / h_;
+    for (const TouchedBody& body : plan_.touched) {
+      const auto D = load<Displacement, S>(displacement, body.slot);
+      store(bodies_.uneven, body.slot, carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
+      for (int k = 0; k < 6; ++k) {
+        const S uneven = rate * bodies_.uneven(body.slot, k);
+        bodies_.even(body.slot, k) = lasting(uneven, bodies_.last(body.slot, k));
+        bodies_.last(body.slot, k) = uneven;
+      }
+    }
+    add_given_up(tree_, placement, bodies_.given, impulse);
+    keep_ground(points_);
+  }
+
+  /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
+  void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) {
+    const S half(0.5), rate = S(1.0) / h_;
+    joint_impulses_end_map(sum_, h_, delta, end);
+    if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
+    const S most = as<S>(std::numeric_limits<typename ElementOf<S>::type>::max()), zero(0.0);
+    for (Index row = 0; row < end.rows(); ++row) {
+      S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
+      if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
+      const auto held = sum_.stiffness(row) > most;
+      // the step that comes to rest is an impact
+      uneven = select(held, select(delta(row) == zero, uneven + half * residual(row), zero), uneven);
+      residual(row) = select(held, zero, residual(row));
+      uneven = rate * uneven;
+      even_(row) = lasting(uneven, last_(row));
+      last_(row) = uneven;
+    }
+  }
+
+  /// p with the impulses of the last step taken half at each of its ends: what velocities are read from.
+  template <class Element>
+  void even_out(const BodyConstants<Element>& constants, const Field<S, 12>& placement, Field<S, 6>& scratch, Field<S>& projected,
+                Field<S>& p) const {
+    if (plan_.bodies) {
+      std::ranges::copy(bodies_.even.flat(), scratch.flat().begin());
+      impulse_up(tree_, constants, placement, scratch, projected);
+      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + projected(row);
+    }
+    if (plan_.joints) {
+      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + even_(row);
+    }
+  }
+  /// The state is another's from now on.
+  void forget() {
+    const auto clear = [](auto& field) { std::ranges::fill(field.flat(), S(0.0)); };
+    clear(last_);
+    clear(even_);
+    clear(bodies_.last);
+    clear(bodies_.even);
+  }
+
+  /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
+  /// last step; `known`: it was one of these sweeps.
+  EffectWork<S> work(const Field<S>& residual, const Field<S>& delta, const Field<S>& before, bool known) const {
+    EffectWork<S> work;
+    if (plan_.joints) {
+      work.damping = damping_loss(plan_.effects.damping, plan_.damping_share, h_, delta, before);
+      work.friction = friction_loss(frictions_, h_, residual, delta, before);
+      work.limits = limit_loss(limits_, h_, residual, delta, before);
+      work.servo = servo_work(servos_, plan_.q_row, h_, *q_, delta, before);
+      work.torque = torque_work(plan_.effects.torques, force_, delta);
+    }
+    if (plan_.bodies) {
+      for (Index k = 0; k < drags_.loss.rows(); ++k) work.drag = work.drag + drags_.loss(k);
+      for (Index k = 0; k < wrenches_.work.rows(); ++k) work.wrench = work.wrench + wrenches_.work(k);
+      work.ground = -ground_work(plan_.ground, known, points_);
+    }
+    return work;
+  }
+  /// Magnitudes of the work of all effects in that step, springs included [J].
+  S activity(const EffectWork<S>& work, const Field<S, 7>& motion, const Field<S>& delta) const {
+    using std::abs;
+    return work.magnitude() + abs(spring_work(plan_.effects.springs, plan_.q_row, *q_, delta)) +
+           abs(ball_spring_work(plan_.effects.ball_springs, tree_, *q_, motion, delta));
+  }
+  /// Its kernels by their names in the schedule (sweeps.hpp), to be measured one by one in a step that has been evaluated: visit(name,
+  /// call). What the calls write is of no use.
+  template <class Element, class Visit>
+  void each_kernel(const BodyConstants<Element>& constants, const Field<S>& q, Workspace<S>& work, Field<S>& end, const Visit& visit) {
+    const Effects& effects = plan_.effects;
+    const auto past = [&work](Index row, int) { return work.delta(row); };
+    const auto on = [&](bool any, const char* name, auto call) {
+      if (any) visit(name, std::move(call));
+    };
+    const bool points = !plan_.ground.points.empty();
+    on(!effects.limits.empty(), "begin_limits", [=, this, &q, &work] { begin_limits(limits_, plan_.q_row, h_, q, past, true, work.delta); });
+    on(!effects.friction.empty(), "begin_friction", [=, this, &work] { begin_friction(frictions_, past, true, work.delta); });
+    on(!effects.armature.empty(), "armature_map", [=, this] { armature_map(plan_.effects.armature, sum_); });
+    on(!effects.springs.empty(), "spring_map", [=, this, &q] { spring_map(plan_.effects.springs, plan_.q_row, h_, q, sum_); });
+    on(!effects.ball_springs.empty(), "ball_spring_stiffness",
+       [=, this] { ball_spring_stiffness(plan_.effects.ball_springs, tree_, h_, sum_); });
+    on(!effects.damping.empty(), "damping_map", [=, this] { damping_map(plan_.effects.damping, plan_.damping_share, h_, sum_); });
+    on(!effects.torques.empty(), "torque_map", [=, this] { torque_map(plan_.effects.torques, force_, h_, sum_); });
+    on(!effects.servos.empty(), "servo_map", [=, this, &q] { servo_map(servos_, plan_.q_row, h_, q, sum_); });
+    on(!effects.friction.empty(), "friction_map", [=, this] { friction_map(frictions_, h_, 0.0, sum_); });
+    const auto on_bodies = [=, this](auto call) {
+      return [=, this] {
+        for (const TouchedBody& body : plan_.touched) call(body);
+      };
+    };
+    on(!effects.drag.empty(), "drag_map", on_bodies([this, &constants, &work](const TouchedBody& body) {
+         drag_map(drags_, body.drag.first, body.drag.last, constants, h_, work.displacement, bodies_, work.impulse);
+       }));
+    on(!effects.wrenches.empty(), "wrench_map", on_bodies([this, &work](const TouchedBody& body) {
+         wrench_map(wrenches_, body.wrenches.first, body.wrenches.last, h_, work.displacement, bodies_, work.impulse);
+       }));
+    on(points, "ground_map", on_bodies([this, &work](const TouchedBody& body) {
+         ground_map(plan_.ground, body.points.first, body.points.last, h_, 0.0, work.displacement, points_, bodies_, work.impulse);
+       }));
+    on(plan_.joints, "joint_impulses_map", [=, this, &work] { joint_impulses_map(sum_, work.delta, work.momentum_target); });
+    on(!effects.ball_springs.empty(), "ball_spring_map",
+       [=, this, &q, &work] { ball_spring_map(plan_.effects.ball_springs, tree_, h_, q, work.motion, work.momentum_target); });
+    on(!effects.servos.empty(), "revise_servos", [=, this, &q, &work] { revise_servos(servos_, plan_.q_row, h_, q, work.delta); });
+    on(!effects.friction.empty(), "revise_friction",
+       [=, this, &work] { revise_friction(frictions_, h_, work.innovation, true, S(0.0), work.delta); });
+    on(!effects.limits.empty(), "revise_limits", [=, this, &work] { revise_limits(limits_, work.innovation, true, work.delta); });
+    on(points, "revise_ground", [=, this] { revise_ground(points_, true, S(0.0)); });
+    on(plan_.joints, "joint_impulses_end_map", [=, this, &work, &end] { joint_impulses_end_map(sum_, h_, work.delta, end); });
+    on(plan_.bodies, "add_given_up", [=, this, &work] { add_given_up(tree_, work.placement, bodies_.given, work.impulse); });
+    on(plan_.bodies, "world_placement_down", [=, this, &work] { world_placement_down(tree_, work.placement, bodies_.pose); });
+    on(points, "find_ground", [=, this] { find_ground(plan_.ground, bodies_.pose, points_); });
+  }
+  /// Taken from work().ground once the potential at the end is known.
+  S ground_stored() const { return ground_potential_ - ground_before_; }
+
+ private:
+  /// sum_ from all effects in their states.
+  void assemble() {
+    clear(sum_);
+    const Effects& effects = plan_.effects;
+    armature_map(effects.armature, sum_);
+    spring_map(effects.springs, plan_.q_row, h_, *q_, sum_);
+    ball_spring_stiffness(effects.ball_springs, tree_, h_, sum_);
+    damping_map(effects.damping, plan_.damping_share, h_, sum_);
+    torque_map(effects.torques, force_, h_, sum_);
+    servo_map(servos_, plan_.q_row, h_, *q_, sum_);
+    friction_map(frictions_, h_, creep_, sum_);
+    if (creep_ == 0) hold_friction(frictions_, sum_);
+    hold_limits(limits_, sum_);
+  }
+  void clear_bodies() {
+    for (Index i = 0; i < tree_.shape.slots; ++i) clear_body(bodies_, i);
+  }
+
+  const EffectPlan& plan_;
+  const Tree& tree_;
+  S h_{};
+  double creep_ = 0;
+  Field<S> last_, even_;  // of joints, as BodyImpulses has them of bodies
+  const Field<S>* q_ = nullptr;
+  Field<S> rotors_;
+  JointImpulses<S> sum_;
+  Servos<S> servos_;
+  Frictions<S> frictions_;
+  Limits<S> limits_;
+  Field<S> force_;  // of each given torque
+  BodyImpulses<S> bodies_;
+  GroundPoints<S> points_;
+  Drags<S> drags_;
+  Wrenches<S> wrenches_;
+  S ground_potential_ = S(0.0), ground_before_ = S(0.0);
+};
+
+/// Where a scene has none: no memory and nothing to call.
+struct NoEffects {
+  NoEffects(const EffectPlan&, const Model&) {}
+};
+template <bool kEffects, class S>
+using EffectsIf = std::conditional_t<kEffects, EffectSweeps<S>, NoEffects>;
+
+}  // namespace linden

@@ -1,0 +1,56 @@
+#include "engine/step/first_guess.hpp"
+
+#include "kernels/impulse_up.hpp"
+#include "kernels/velocity_down.hpp"
+
+namespace linden {
+namespace {
+
+/// Next value of the polynomial through the last 1, ..., 5 values, latest first.
+constexpr double kExtrapolation[kHistory][kHistory] = {
+    {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}, {5, -10, 10, -5, 1},
+};
+
+}  // namespace
+
+template <bool kEffects>
+void first_guess(FirstGuess guess, const Model& model, const State<double>& state, int history, double h, TreeSweeps<kEffects>& sweeps) {
+  Workspace<double>& work = sweeps.work();
+  Field<double>& delta = work.delta;
+  const Index n = model.tree.shape.velocities;
+  const auto zero = [&] {
+    for (Index row = 0; row < n; ++row) delta(row) = 0;
+  };
+  switch (guess) {
+    case FirstGuess::ig1: return zero();
+    case FirstGuess::ig2:
+      if (history == 0) break;
+      for (Index row = 0; row < n; ++row) delta(row) = state.history(row, 0);
+      return;
+    case FirstGuess::ig3: {
+      // qdd = M^-1 (-C + Q), semi-implicit Euler: delta = h (v + h qdd)
+      sweeps.velocity_of(state.p, delta);
+      velocity_down(model.tree, sweeps.constants(), work.placement, delta, work.twist);
+      coriolis_down(model.tree, sweeps.constants(), work.placement, delta, work.twist, work.bias, work.impulse);
+      impulse_up(model.tree, sweeps.constants(), work.placement, work.impulse, work.residual);
+      for (Index row = 0; row < n; ++row) work.residual(row) = work.force(row) - work.residual(row);
+      sweeps.apply_mass_inverse(work.residual, work.residual);
+      for (Index row = 0; row < n; ++row) delta(row) = h * (delta(row) + h * work.residual(row));
+      return;
+    }
+    case FirstGuess::extrapolation:
+      if (history == 0) break;
+      for (Index row = 0; row < n; ++row) {
+        double next = 0;
+        for (int k = 0; k < history; ++k) next += kExtrapolation[history - 1][k] * state.history(row, k);
+        delta(row) = next;
+      }
+      return;
+  }
+  // No displacement is known yet: h M^-1 (p + h/2 Q).
+  sweeps.velocity_of(work.momentum_target, delta);
+}
+
+template void first_guess(FirstGuess, const Model&, const State<double>&, int, double, TreeSweeps<LINDEN_ACTING>&);
+
+}  // namespace linden

@@ -1,0 +1,56 @@
+// engine/step/instance_stepper.hpp
+// One instance of a block on its own, in double precision: its start, and the steps that a block cannot take because they need
+// backtracking or splitting.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "engine/step/stepper.hpp"
+
+namespace linden {
+
+class InstanceStepper {
+ public:
+  InstanceStepper(const Model& model, const Options& options, const EffectPlan& plan);
+  // not inline: compiled for every processor, where those that use it are compiled for one
+  ~InstanceStepper();
+
+  State<double>& state() { return state_; }
+
+  /// Inertia of every body [slots x 10]; subtree masses follow.
+  BodyConstants<double>& own_constants();
+  /// Generalized forces [nv] to be written; from the first call on they count.
+  std::span<double> applied();
+
+  /// How contact point k ended the step (EffectSweeps::contact).
+  double contact(Index k) const { return stepper_->contact(k); }
+  /// Targets of the plan's servos, to be written.
+  std::span<double> servo_targets() { return stepper_->servo_targets(); }
+  std::span<double> friction_forces() { return stepper_->friction_forces(); }
+
+  /// One step of the state, from `time` on. state().pace says what is known of the step before.
+  StepReport step(double time);
+  /// p = M(q) v.
+  void set_velocities(std::span<const double> v);
+  /// Energy; and rate() is v = M^-1 p.
+  Energy observe();
+  const Field<double>& rate() const { return rate_; }
+
+ private:
+  void refresh();
+
+  const Model& model_;
+  Options options_;
+  std::unique_ptr<Stepper> stepper_;
+  State<double> state_;
+  Field<double> rate_;
+  BodyConstants<double> constants_;  // empty where the model's are meant
+  std::vector<double> applied_;      // empty where there are none
+};
+
+/// Quaternions of ball and free joints to unit length, followers of mimic joints to their leaders. Throws InputError for a position that
+/// is not finite or a quaternion of length zero.
+void normalise_positions(const Model& model, std::span<double> q);
+
+}  // namespace linden

@@ -1,0 +1,478 @@
+// engine/step/lane_stepper.hpp
+// Steps of a block of W instances: lane = instance. `Pack` is a register of W numbers (or one number), `kOwnMasses` says
+// whether masses differ between instances, `kEffects` whether anything acts beside gravity.
+//
+//   momentum_target, first guess
+//   start_down                        guess -> displacements, momenta
+//   newton_up                         residual, Jacobian to first order and its factor, first half of a solve
+//   +-> correct_down                  second half of the solve, corrected displacements, momenta
+//   |   innovation_up (or newton_up)  residual and its norm: which lanes have converged?
+//   +-- in lanes that have not
+//   advance_down, momentum_up         new positions, placements, forces, momenta
+//
+// What is decided of a lane - whether it goes on, has converged, is lost - depends on its own numbers and on how often it was corrected,
+// never on its neighbours; lanes that are done are kept aside while others go on. Every instruction that a lane's result depends on is
+// the same in any company, so results are equal to the bit in any block, any place and with any number of threads.
+//
+// The Jacobian is factored to first order at the guess, exactly at every second correction from the second on. A lane that
+// kMostCorrections do not bring home, that gets no nearer, turns a body by pi or gains energy is stepped alone, with all that a
+// Simulation can do (InstanceStepper); if that fails too it is frozen at its last good state.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "engine/step/block_stepper.hpp"
+#include "engine/step/convergence.hpp"
+#include "engine/step/instance_stepper.hpp"
+#include "engine/step/lane_effects.hpp"
+#include "engine/step/lanes_of.hpp"
+#include "kernels/advance_down.hpp"
+#include "kernels/articulated_inertia_up.hpp"
+#include "kernels/innovation_up.hpp"
+#include "kernels/momentum_update_map.hpp"
+#include "kernels/rounding_floor_map.hpp"
+#include "layout/packed_history.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+
+inline constexpr int kMostCorrections = 8;
+
+/// With effects, whose states may take some corrections to settle; from some on they are revised one by one.
+inline constexpr int kMostEffectCorrections = 24, kBulkEffectCorrections = 8;
+
+template <class Pack, bool kOwnMasses, bool kEffects>
+class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
+ public:
+  using Real = typename ElementOf<Pack>::type;
+  using L = LanesOf<Pack>;
+  using Mask = typename L::Mask;
+  static constexpr int W = L::count;
+
+  explicit LaneStepper(const BlockSetup<Real>& setup)
+      : model_(setup.model), tree_(setup.model.tree), options_(setup.options), shared_constants_(setup.constants),
+        effects_(setup), alone_(model_, options_, setup.plan) {
+    const Shape& shape = tree_.shape;
+    work_.allocate(shape);
+    kept_.allocate(shape);
+    q_.allocate(shape.positions);
+    p_.allocate(shape.velocities);
+    applied_.allocate(shape.velocities);
+    if constexpr (kOwnMasses) {
+      own_constants_.allocate(shape);
+      const auto spread = [](const auto& from, auto& to) {
+        for (std::size_t k = 0; k < to.flat().size(); ++k) to.flat()[k] = Pack(from.flat()[k]);
+      };
+      spread(setup.constants.screw, own_constants_.screw);
+      spread(setup.constants.tree_placement, own_constants_.tree_placement);
+      spread(setup.constants.inertia, own_constants_.inertia);
+      spread(setup.constants.subtree_mass, own_constants_.subtree_mass);
+    }
+    has_gravity_ = options_.gravity != std::array<double, 3>{0, 0, 0};
+    gravity_ = {number(options_.gravity[0]), number(options_.gravity[1]), number(options_.gravity[2])};
+    const double tolerance = sizeof(Real) == sizeof(float) ? std::max(options_.tolerance, kSingleTolerance) : options_.tolerance;
+    tolerance_squared_ = number(tolerance * tolerance);
+    const double unit = kFloorEpsilons * static_cast<double>(std::numeric_limits<Real>::epsilon());
+    floor_unit_squared_ = number(unit * unit);
+    constexpr double ceiling = sizeof(Real) == sizeof(float) ? kSingleFloorCeiling : kFloorCeiling;
+    const auto& g = options_.gravity;
+    fall_per_mass_ = 0.5 * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * std::pow(options_.step, 4);
+    ceiling_squared_ = number(ceiling * ceiling);
+    for (auto& value : work_.delta.flat()) value = number(0);
+    for (auto& value : work_.force.flat()) value = number(0);
+    for (auto& value : work_.innovation.flat()) value = number(0);
+    for (auto& value : work_.impulse.flat()) value = number(0);
+    for (auto& value : work_.field.flat()) value = number(0);
+    set_motion_identity();
+  }
+
+  int lanes() const override { return W; }
+
+  void step(const Block<Real>& block, std::int64_t steps) override {
+    load(block);
+    refresh();
+    if constexpr (kEffects) effects_.load(block);
+    Lanes alive = 0;
+    for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
+    for (std::int64_t k = 0; k < steps && alive != 0; ++k) {
+      if constexpr (kEffects) {
+        alive = step_with_effects(block, alive);
+      } else {
+        alive = step_once(block, alive);
+      }
+    }
+    store(block);
+    if constexpr (kEffects) effects_.store(block);
+  }
+
+  void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
+    load(block);
+    if (!model_.mimics.empty()) return observe_alone(block, velocities, energy);
+    const Pack potential = refresh();
+    solve_mass(p_, work_.increment);
+    Pack kinetic = number(0);
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
+      kinetic = kinetic + number(0.5) * p_(row) * work_.increment(row);
+      L::store(work_.increment(row), velocities + row * W);
+    }
+    L::store(kinetic, energy);
+    L::store(potential, energy + W);
+  }
+
+ private:
+  static Pack number(double value) { return Pack(static_cast<Real>(value)); }
+
+  const auto& constants() const {
+    if constexpr (kOwnMasses) {
+      return own_constants_;
+    } else {
+      return shared_constants_;
+    }
+  }
+  Gains<Pack> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+  const Field<Pack>* applied() const { return has_applied_ ? &applied_ : nullptr; }
+
+  /// Of a screw's motion the sweeps of a block write three numbers of seven.
+  void set_motion_identity() {
+    for (Field<Pack, 7>* motion : {&work_.motion, &work_.displacement, &kept_.motion, &kept_.displacement}) {
+      for (Index i = 0; i < motion->rows(); ++i) {
+        for (int k = 0; k < 7; ++k) (*motion)(i, k) = number(k == 3 ? 1 : 0);
+      }
+    }
+  }
+
+  void load(const Block<Real>& block) {
+    for (Index row = 0; row < q_.rows(); ++row) q_(row) = L::load(block.q + row * W);
+    for (Index row = 0; row < p_.rows(); ++row) p_(row) = L::load(block.p + row * W);
+    has_applied_ = block.applied != nullptr;
+    if (has_applied_) {
+      for (Index row = 0; row < p_.rows(); ++row) applied_(row) = L::load(block.applied + row * W);
+    }
+    if constexpr (kOwnMasses) {
+      const Real* from = block.mass;
+      for (Index i = 0; i < tree_.shape.slots; ++i) {
+        for (int k = 0; k < 10; ++k, from += W) own_constants_.inertia(i, k) = L::load(from);
+        own_constants_.subtree_mass(i) = L::load(from);
+        from += W;
+      }
+    }
+  }
+
+  void store(const Block<Real>& block) const {
+    for (Index row = 0; row < q_.rows(); ++row) L::store(q_(row), block.q + row * W);
+    for (Index row = 0; row < p_.rows(); ++row) L::store(p_(row), block.p + row * W);
+  }
+
+  /// Placements and forces of the positions as they are; returns the potential energy. The same instructions as at the end of a step, so
+  /// that it does not matter how many steps are taken in one go.
+  Pack refresh() {
+    advance(L::mask(0));
+    const Pack potential = update_momentum(L::mask(0));
+    if constexpr (kEffects) return potential + effects_.refresh(work_.placement, q_);
+    return potential;
+  }
+
+  void advance(const Mask& moves) {
+    if (has_gravity_) {
+      advance_down<true>(tree_, constants(), gravity_, moves, work_, q_);
+    } else {
+      advance_down<false>(tree_, constants(), gravity_, moves, work_, q_);
+    }
+  }
+
+  Pack update_momentum(const Mask& moves) {
+    const Pack h = number(options_.step);
+    if (has_gravity_) return momentum_up<true>(tree_, constants(), h, moves, applied(), work_, p_);
+    return momentum_up<false>(tree_, constants(), h, moves, applied(), work_, p_);
+  }
+
+  [[gnu::noinline]] void solve_mass(const Field<Pack>& right_side, Field<Pack>& rate) {
+    const auto factor = [&](const auto& rotors) {
+      articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains(), rotors);
+    };
+    if constexpr (kEffects) {
+      effects_.with_rotors(factor);
+    } else {
+      factor(NothingAdded{});
+    }
+    impulse_pass_up(tree_, constants(), work_.placement, gains(), right_side, work_.bias, work_.innovation);
+    rate_down(tree_, constants(), work_.placement, gains(), work_.innovation, work_.variation, rate);
+  }
+
+  void first_guess(const Block<Real>& block, Lanes alive) {
+    Lanes known = 0;
+    for (int l = 0; l < block.count; ++l) known |= block.instances[l].displacements > 0 ? 1u << l : 0u;
+    constexpr int words = kHistoryWords<Real> * W;
+    alignas(kAlignment) Real next[W];
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
+      extrapolate<W>(block.past + row * words, next);
+      work_.delta(row) = L::load(next);
+    }
+    if ((alive & ~known) != 0) {
+      // no displacement is known yet: h M^-1 (p + h/2 Q)
+      solve_mass(work_.momentum_target, work_.increment);
+      const Mask extrapolated = L::mask(known);
+      for (Index row = 0; row < tree_.shape.velocities; ++row) {
+        work_.delta(row) = select(extrapolated, work_.delta(row), work_.increment(row));
+      }
+    }
+  }
+
+  /// Work of the forces along the displacement of the step [J].
+  Pack work() const {
+    Pack sum = number(0);
+    for (Index row = 0; row < tree_.shape.velocities; ++row) sum = sum + work_.force(row) * work_.delta(row);
+    return sum;
+  }
+
+  [[gnu::noinline]] void keep(Lanes lanes) { blend(kept_, work_, L::mask(lanes)); }
+  [[gnu::noinline]] void bring_back(Lanes lanes) { blend(work_, kept_, L::mask(lanes)); }
+
+  template <class To, class From>
+  void blend(To& to, const From& from, const Mask& lanes) {
+    const auto each = [&](auto& target, const auto& source) {
+      for (std::size_t k = 0; k < target.flat().size(); ++k) {
+        target.flat()[k] = select(lanes, source.flat()[k], target.flat()[k]);
+      }
+    };
+    each(to.motion, from.motion);
+    each(to.displacement, from.displacement);
+    each(to.impulse, from.impulse);
+    each(to.innovation, from.innovation);
+    each(to.delta, from.delta);
+  }
+
+  Lanes at_rounding_floor(const Pack& norm, const Pack& energy) {
+    const Pack sum = rounding_floor_map(tree_, constants(), work_.momentum_target, work_.impulse, work_.joint_inverse);
+    const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
+    return L::bits(number(0.5) * norm <= ceiling_squared_ * (energy + fall)) & L::bits(norm <= floor_unit_squared_ * sum);
+  }
+
+  /// Returns the lanes still alive.
+  Lanes step_once(const Block<Real>& block, Lanes alive) {
+    const Pack h = number(options_.step);
+    momentum_target_map(tree_, h, p_, work_.force, work_.momentum_target);
+    Lanes active = model_.mimics.empty() ? alive : 0, done = 0, lost = alive & ~active;
+    Pack energy = number(0);
+    if (active != 0) {
+      first_guess(block, active);
+      start_down(tree_, constants(), work_);
+      Pack norm = newton_up<true>(tree_, constants(), work_);
+      for (int corrections = 1;; ++corrections) {
+        const Pack before = norm;
+        const Evaluation<Pack> now = correct_down(tree_, constants(), L::mask(active), work_);
+        norm = corrections % 2 == 0 ? newton_up<false>(tree_, constants(), work_) : innovation_up(tree_, constants(), work_);
+        const Pack limit = number(std::numeric_limits<Real>::max());
+        const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
+        Lanes ok = active & usable & L::bits(number(0.5) * norm <= tolerance_squared_ * now.energy);
+        const Lanes left = active & ~ok;
+        if (left != 0) {
+          const Lanes slow = left & usable & ~L::bits(norm <= number(kSlowProgress * kSlowProgress) * before);
+          if (slow != 0) ok |= slow & at_rounding_floor(norm, now.energy);
+          Lanes given_up = left & ~usable;
+          if (corrections > 1) given_up |= left & ~L::bits(norm < before);
+          if (corrections == kMostCorrections) given_up |= left;
+          lost |= given_up & ~ok;
+        }
+        energy = select(L::mask(ok), now.energy, energy);
+        for (int l = 0; l < block.count; ++l) {
+          if ((active >> l & 1u) != 0 && ((ok | lost) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
+        }
+        active &= ~(ok | lost);
+        if (active == 0) {
+          if (done != 0) bring_back(done);
+          done |= ok;
+          break;
+        }
+        if (ok != 0) keep(ok);
+        done |= ok;
+      }
+    }
+    return finish(block, alive, done, lost, energy);
+  }
+
+  /// As step_once. The factor is exact and fresh at every evaluation, so that lanes that wait for others compute what they had, and what
+  /// becomes of a lane whose effects change their state depends on itself alone.
+  [[gnu::noinline]] Lanes step_with_effects(const Block<Real>& block, Lanes alive) {
+    const Pack h = number(options_.step);
+    momentum_target_map(tree_, h, p_, work_.force, work_.momentum_target);
+    Lanes active = model_.mimics.empty() ? alive : 0, done = 0, lost = alive & ~active;
+    Pack energy = number(0);
+    if (active != 0) {
+      first_guess(block, active);
+      effects_.begin(block, options_.step, q_, work_);
+      Evaluation<Pack> now = start_down(tree_, constants(), work_);
+      if (effects_->contacts() > 0) effects_->guess_points(work_.displacement, true);
+      Pack norm = effects_.act(constants(), work_, now);
+      const Pack limit = number(std::numeric_limits<Real>::max());
+      const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
+      for (int corrections = 0;; ++corrections) {
+        const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
+        const Pack scale = now.energy + fall;
+        Lanes ok = usable & L::bits(number(0.5) * norm <= tolerance_squared_ * scale);
+        ok |= usable & ~ok & at_rounding_floor(norm, now.energy);
+        const Lanes settled = ok | (usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale));
+        Lanes changed = 0;
+        if (effects_->plan().revises) {
+          const Mask one_by_one = corrections >= kBulkEffectCorrections ? L::mask(~Lanes{0}) : L::mask(0);
+          changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
+        }
+        ok &= active & ~changed;
+        const Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
+        energy = select(L::mask(ok), now.energy, energy);
+        for (int l = 0; l < block.count; ++l) {
+          if (((ok | given_up) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
+        }
+        done |= ok;
+        lost |= given_up;
+        active &= ~(ok | given_up);
+        if (active == 0) break;
+        now = correct_down(tree_, constants(), L::mask(active & ~changed), work_);
+        norm = effects_.act(constants(), work_, now);
+      }
+    }
+    return finish(block, alive, done, lost, energy);
+  }
+
+  Lanes finish(const Block<Real>& block, Lanes alive, Lanes done, Lanes lost, const Pack& energy) {
+    const double rate = 1 / options_.step;
+    displacement_map(tree_, work_.motion, work_.delta);
+    const Pack kinetic = number(rate * rate) * energy;
+    const Pack pace = L::load(block.pace), pace_work = L::load(block.pace + W);
+    const Pack work_at_begin = work();
+    using std::max;
+    Pack activity = number(0);
+    if constexpr (kEffects) activity = effects_.activity(work_);
+    const Lanes gains =
+        L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) - activity > number(kMostGain) * max(kinetic, pace));
+    lost |= done & gains;
+    done &= ~lost;
+
+    Lanes frozen = 0;
+    for (int l = 0; l < W; ++l) {
+      if ((lost >> l & 1u) != 0 && !step_alone(block, l)) frozen |= 1u << l;
+    }
+
+    const Mask moves = L::mask(done);
+    if constexpr (kEffects) effects_.end(moves, work_);
+    advance(moves);
+    update_momentum(moves);
+    if constexpr (kEffects) {
+      effects_.add_end(moves, p_);
+      effects_.refresh(work_.placement, q_);
+    }
+    if (done == 0) return alive & ~frozen;
+
+    Pack kept = kinetic;
+    if constexpr (kEffects) kept = max(kinetic, select(pace > number(0), number(kImpactMemory) * pace, number(0)));
+    L::store(select(moves, kept, L::load(block.pace)), block.pace);
+    L::store(select(moves, number(0.5) * (work_at_begin + work()), L::load(block.pace + W)), block.pace + W);
+    std::array<std::int32_t, W> known;
+    for (int l = 0; l < W; ++l) {
+      known[static_cast<std::size_t>(l)] = -1;
+      if ((done >> l & 1u) == 0) continue;
+      InstanceRecord& instance = block.instances[l];
+      known[static_cast<std::size_t>(l)] = instance.displacements;
+      instance.displacements = static_cast<std::int8_t>(std::min(instance.displacements + 1, 2));
+      instance.steps += 1;
+    }
+    constexpr int words = kHistoryWords<Real> * W;
+    alignas(kAlignment) Real delta[W];
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
+      L::store(work_.delta(row), delta);
+      remember<W>(delta, known.data(), block.past + row * words);
+    }
+    return alive & ~frozen;
+  }
+
+  /// Lane l as it stands, for alone_.
+  void take_out(const Block<Real>& block, int l) {
+    State<double>& state = alone_.state();
+    const auto take = [&](const Field<Pack>& from, std::span<double> to) {
+      for (std::size_t row = 0; row < to.size(); ++row) to[row] = static_cast<double>(L::lane(from(static_cast<Index>(row)), l));
+    };
+    take(q_, state.q.flat());
+    take(p_, state.p.flat());
+    if (has_applied_) take(applied_, alone_.applied());
+    if constexpr (kEffects) {
+      if (block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
+      if (block.frictions != nullptr) take(effects_->friction_forces(), alone_.friction_forces());
+    }
+    if constexpr (kOwnMasses) {
+      Field<double, 10>& inertia = alone_.own_constants().inertia;
+      for (Index i = 0; i < inertia.rows(); ++i) {
+        for (int k = 0; k < 10; ++k) inertia(i, k) = static_cast<double>(L::lane(own_constants_.inertia(i, k), l));
+      }
+    }
+    for (int k = 0; k < 2; ++k) state.pace(0, k) = static_cast<double>(block.pace[k * W + l]);
+  }
+
+  void observe_alone(const Block<Real>& block, Real* velocities, Real* energy) {
+    for (int l = 0; l < W; ++l) {
+      take_out(block, l);
+      const Energy seen = alone_.observe();
+      for (Index row = 0; row < p_.rows(); ++row) velocities[row * W + l] = static_cast<Real>(alone_.rate()(row));
+      energy[l] = static_cast<Real>(seen.kinetic);
+      energy[W + l] = static_cast<Real>(seen.potential);
+    }
+  }
+
+  /// What the next step of lane l wants to know of one taken alone: its contacts and, where it was not split, its displacement.
+  void keep_alone(const Block<Real>& block, int l, bool whole) {
+    effects_.keep_alone(l, alone_);
+    if (!whole) return;
+    constexpr int words = kHistoryWords<Real> * W;
+    std::array<std::int32_t, W> known;
+    known.fill(-1);
+    known[static_cast<std::size_t>(l)] = 0;
+    std::array<Real, W> delta{};
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
+      delta[static_cast<std::size_t>(l)] = static_cast<Real>(alone_.state().history(row, 0));
+      remember<W>(delta.data(), known.data(), block.past + row * words);
+    }
+    block.instances[l].displacements = 1;
+  }
+
+  /// One instance with everything a Simulation can do. False where that fails too: it is frozen then.
+  [[gnu::noinline]] bool step_alone(const Block<Real>& block, int l) {
+    State<double>& state = alone_.state();
+    take_out(block, l);
+    const StepReport report = alone_.step(static_cast<double>(block.instances[l].steps) * options_.step);
+    InstanceRecord& instance = block.instances[l];
+    instance.evaluations += report.evaluations;
+    instance.displacements = 0;
+    if (!report.ok()) {
+      instance.status = report.status;
+      instance.slot = report.slot;
+      instance.residual = report.residual;
+      return false;
+    }
+    instance.rescued += 1;
+    instance.steps += 1;
+    for (int k = 0; k < 2; ++k) block.pace[k * W + l] = static_cast<Real>(state.pace(0, k));
+    if constexpr (kEffects) keep_alone(block, l, report.substeps == 1);
+    for (Index row = 0; row < q_.rows(); ++row) L::set_lane(q_(row), l, state.q(row));
+    for (Index row = 0; row < p_.rows(); ++row) L::set_lane(p_(row), l, state.p(row));
+    return true;
+  }
+
+  const Model& model_;
+  const Tree& tree_;
+  Options options_;
+  const BodyConstants<Real>& shared_constants_;
+  bool has_gravity_ = false, has_applied_ = false;
+  Vec3<Pack> gravity_;
+  Pack tolerance_squared_, floor_unit_squared_, ceiling_squared_;
+  double fall_per_mass_ = 0;  // h^2 x kinetic energy per kilogram that gravity gives in a step
+  BodyConstants<Pack> own_constants_;  // empty where all share the model's
+  Workspace<Pack> work_;
+  Kept<Pack> kept_;
+  Field<Pack> q_, p_, applied_;
+  [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;
+  InstanceStepper alone_;
+};
+
+}  // namespace linden

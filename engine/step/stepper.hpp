@@ -1,0 +1,69 @@
+// engine/step/stepper.hpp
+// The one-step map (q, p) -> (q, p) of one instance: solve the discrete Euler-Lagrange equation for the displacement, then read off the
+// new momentum. tree_stepper.hpp says how.
+//
+// Symplectic, time-symmetric, second order; no allocation. A solve that makes no progress is backtracked, then given a fresh exact
+// Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/options.hpp"
+#include "engine/step/effect_sweeps.hpp"
+#include "engine/step_report.hpp"
+#include "layout/state.hpp"
+
+namespace linden {
+
+struct Energy {
+  double kinetic = 0;    // 1/2 p.M^-1 p [J]
+  double potential = 0;  // of gravity (zero where the centre of mass is at the height of the world's origin), springs and ground [J]
+  double total() const { return kinetic + potential; }
+};
+
+class Stepper {
+ public:
+  virtual ~Stepper();
+
+  /// Brings placements and forces to the positions in `state`; call after any change of them from outside.
+  virtual void refresh(const State<double>& state) = 0;
+  /// Generalized forces [nv] on top of gravity, the same until they are set anew; followed by a refresh. Empty: none.
+  virtual void apply(std::span<const double> force) = 0;
+  /// Masses and inertias of an instance that differs from the model, followed by a refresh. They must live as long as they are used.
+  virtual void use(const BodyConstants<double>& constants) = 0;
+  /// The state is another's from now on, or was changed: nothing is known of a step before.
+  virtual void forget() = 0;
+
+  /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
+  /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
+  virtual StepReport step(State<double>& state, int& history, double time, double h) = 0;
+  /// Of effects, in the step taken last.
+  virtual const EffectWork<double>& effect_work() const = 0;
+
+  /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; empty without servos.
+  virtual std::span<double> servo_targets() = 0;
+  /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
+  virtual std::span<double> friction_forces() = 0;
+  /// How contact point k ended the last step (EffectSweeps::contact).
+  virtual double contact(Index k) const = 0;
+  /// What effects keep from step to step beside the state: part of a checkpoint.
+  virtual std::vector<std::span<double>> effect_memory() = 0;
+
+  /// v = M(q)^-1 p for the positions of the last refresh or step; at the end of a step with effects, p with their impulses taken half
+  /// at each end of it (kernels/effects/body_impulses.hpp). Returns that p.
+  virtual const Field<double>& read_velocity(const Field<double>& p, Field<double>& v) = 0;
+  /// p = M(q) v.
+  virtual void momentum_of(const Field<double>& v, Field<double>& p) = 0;
+  /// Momentum of the whole system about the world's origin, in the world's frame, for rates v.
+  virtual Wrench<double> total_momentum(const Field<double>& v) = 0;
+  /// Of a state with the positions of the last refresh or step; rate = M^-1 p on the way.
+  virtual Energy energy_of(const Field<double>& p, Field<double>& rate) = 0;
+};
+
+/// With the effects of the plan, where it has any. Model and plan must outlive the stepper. Throws InputError for options that make no
+/// sense.
+std::unique_ptr<Stepper> make_stepper(const Model& model, const Options& options, const EffectPlan& plan);
+
+}  // namespace linden

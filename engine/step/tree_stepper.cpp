@@ -1,0 +1,427 @@
+// Compiled with effects and without; CMakeLists.txt says which: LINDEN_ACTING is true or false.
+#include "engine/step/tree_stepper.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "engine/step/convergence.hpp"
+#include "engine/step/diagnosis.hpp"
+#include "engine/step/first_guess.hpp"
+#include "kernels/advance_map.hpp"
+#include "kernels/momentum_update_map.hpp"
+#include "kernels/motion_map.hpp"
+
+namespace linden {
+namespace {
+
+constexpr int kMaxBacktracks = 10;
+
+/// Only a residual within this factor of the tolerance is looked at for bare rounding: the look costs a tenth of a correction.
+constexpr double kNearTolerance = 1e4;
+
+/// Revisions of effects' states in one solve: a pile of joints that stick and slide at once takes some ten.
+constexpr int kMostRevisions = 20, kLastRevision = 60;
+
+/// From then on they are made one by one.
+constexpr int kBulkRevisions = 5;
+
+/// Where they do not settle: speeds up to which friction is made smooth, one after the other [m/s, rad/s].
+constexpr double kSoftCreeps[] = {1e-2, 1e-3, 1e-4, 1e-5};
+constexpr int kMostSoftCorrections = 40;
+
+/// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
+constexpr double kSteepest = 0.5;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+template <bool kEffects>
+TreeStepper<kEffects>::TreeStepper(const Model& model, const Options& options, const EffectPlan& plan)
+    : model_(model),
+      options_(options),
+      max_iterations_(options.max_iterations > 0 ? options.max_iterations : options.solver == Solver::newton ? 50 : 1000),
+      sweeps_(model, options, plan),
+      work_(sweeps_.work()),
+      effects_(sweeps_.effects()) {
+  check(options);
+  last_good_.allocate(model.tree.shape);
+  if constexpr (kEffects) {
+    before_.allocate(model.tree.shape.velocities);
+    before_innovation_.allocate(model.tree.shape.velocities);
+  }
+}
+
+template <bool kEffects>
+StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h) {
+  StepReport report;
+  time_ = time;
+  effect_work_ = {};
+  report.status = solve(state, history, h, report);
+  if (report.ok()) {
+    finish(state, history, h);
+    return report;
+  }
+  // The whole step failed: two halves, each split again if need be, from the state as it was.
+  last_good_ = state;
+  const int history_before = history;
+  history = 0;
+  report.substeps = 0;
+  if (halves(state, history, h, 1, report)) {
+    report.status = StepStatus::converged;
+    report.slot = 0;
+    return report;
+  }
+  report.residual = failed_residual_;
+  state = last_good_;
+  history = history_before;
+  effect_work_ = {};
+  sweeps_.refresh(state.q);
+  return report;
+}
+
+template <bool kEffects>
+bool TreeStepper<kEffects>::halves(State<double>& state, int& history, double h, int depth, StepReport& report) {
+  if (depth > options_.max_splits) return false;
+  for (int half = 0; half < 2; ++half) {
+    report.status = solve(state, 0, h / 2, report);
+    if (report.ok()) {
+      finish(state, history, h / 2);
+      report.substeps += 1;
+    } else if (!halves(state, history, h / 2, depth + 1, report)) {
+      return false;
+    }
+    history = 0;
+  }
+  return true;
+}
+
+template <bool kEffects>
+bool TreeStepper<kEffects>::converged(const Evaluated& now, double norm, double h) const {
+  if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * std::abs(h);
+  return 0.5 * norm <= options_.tolerance * options_.tolerance * now.scale;
+}
+
+/// h^2 x kinetic energy that gravity gives in a step to what is at rest.
+template <bool kEffects>
+double TreeStepper<kEffects>::fall(double h) const {
+  const auto& g = options_.gravity;
+  return 0.5 * sweeps_.constants().subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::begin_effects(const State<double>& state, int history, double h)
+  requires kEffects
+{
+  if (effects_.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects_.plain_target().flat().begin());
+  const auto past = [&](Index row, int steps) { return state.history(row, steps - 1); };
+  effects_.begin(time_ + 0.5 * h, h, state.q, past, history >= 2, work_.delta);
+  if (history > 0) {
+    for (Index row = 0; row < before_.rows(); ++row) before_(row) = state.history(row, 0);
+  } else {
+    sweeps_.velocity_of(state.p, before_);
+    for (double& value : before_.flat()) value *= h;
+  }
+  known_ = history > 0;
+  sweeps_.begin(known_, fall(h));
+}
+
+template <bool kEffects>
+std::span<double> TreeStepper<kEffects>::servo_targets() {
+  if constexpr (kEffects) return effects_.servo_targets().flat();
+  return {};
+}
+
+template <bool kEffects>
+std::span<double> TreeStepper<kEffects>::friction_forces() {
+  if constexpr (kEffects) return effects_.friction_forces().flat();
+  return {};
+}
+
+template <bool kEffects>
+double TreeStepper<kEffects>::contact([[maybe_unused]] Index k) const {
+  if constexpr (kEffects) return effects_.contact(k);
+  return 0;
+}
+
+template <bool kEffects>
+std::vector<std::span<double>> TreeStepper<kEffects>::effect_memory() {
+  if constexpr (kEffects) {
+    const auto memory = effects_.memory();
+    return {memory.begin(), memory.end()};
+  }
+  return {};
+}
+
+/// Whether the state of an effect changed; work_.delta then says what the motion is to be.
+template <bool kEffects>
+bool TreeStepper<kEffects>::revise_effects(bool settled, bool one_by_one)
+  requires kEffects
+{
+  if (!effects_.revise(sweeps_.left(), settled, one_by_one, work_.delta)) return false;
+  displacement_map(model_.tree, work_.motion, work_.delta);
+  return true;
+}
+
+template <bool kEffects>
+StepStatus TreeStepper<kEffects>::solve(const State<double>& state, int history, double h, StepReport& report) {
+  const StepStatus status = find_root(state, history, h, report);
+  if (status != StepStatus::converged || !gains_energy(state, h)) return status;
+  report.slot = fastest_body(model_, sweeps_.constants(), work_);
+  return StepStatus::gains_energy;
+}
+
+/// Work of a force along the displacement of the step [J].
+template <bool kEffects>
+double TreeStepper<kEffects>::work(const Field<double>& force) const {
+  double sum = 0;
+  for (Index row = 0; row < model_.tree.shape.velocities; ++row) sum += force(row) * work_.delta(row);
+  return sum;
+}
+
+/// Discrete energy, -dL_d/dh, is kinetic energy of the mean motion plus the mean potential of both ends: between neighbouring steps it
+/// changes by what is compared here. Nothing is known of the step before the first.
+template <bool kEffects>
+bool TreeStepper<kEffects>::gains_energy(const State<double>& state, double h) {
+  displacement_map(model_.tree, work_.motion, work_.delta);
+  kinetic_ = momentum_energy_ / (h * h);
+  const double before = state.pace(0, 0);
+  double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + work(work_.force));
+  if constexpr (kEffects) {
+    solved_work_ = effects_.work(sweeps_.left(), work_.delta, before_, known_);
+    // forces that nearly balance leave less kinetic energy than their works, taken half a step apart, differ by
+    double activity = effects_.activity(solved_work_, work_.motion, work_.delta) + sweeps_.effect_potential();
+    for (Index row = 0; row < model_.tree.shape.velocities; ++row) activity += std::abs(work_.force(row) * work_.delta(row));
+    gain -= activity;
+  }
+  const double most = kMostGain * std::max(kinetic_, before);
+  return gain > most && (options_.order == 2 || gain - push() > most);
+}
+
+/// Kinetic energy that the forces give in a whole step to what is at rest: neighbouring sub-steps of different length differ by so much
+/// where the motion turns back.
+template <bool kEffects>
+double TreeStepper<kEffects>::push() {
+  if (sweeps_.one_pass()) std::swap(work_.innovation, work_.residual);  // what the solve left is still needed
+  sweeps_.velocity_of(work_.force, work_.increment);
+  if (sweeps_.one_pass()) std::swap(work_.innovation, work_.residual);
+  double sum = 0;
+  for (Index row = 0; row < model_.tree.shape.velocities; ++row) sum += work_.force(row) * work_.increment(row);
+  return 0.5 * options_.step * options_.step * sum;
+}
+
+/// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so;
+/// `whole`: until that has converged.
+///
+/// With smooth friction the solution of the step minimises a function, convex but for the coupling of friction to the load it goes with,
+/// whose gradient is the residual; each correction is cut to where it falls no further. Its slope along a correction is r.(A^-1 r_before),
+/// the sum of u (d^-1 u_before): known from the passes.
+template <bool kEffects>
+void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
+  requires kEffects
+{
+  for (const double creep : kSoftCreeps) {
+    const bool to_the_end = whole && creep == std::end(kSoftCreeps)[-1];
+    displacement_map(model_.tree, work_.motion, work_.delta);
+    effects_.soften(creep, work_.delta);
+    now = sweeps_.evaluate(report);
+    norm = now.norm;
+    for (int k = 0; k < kMostSoftCorrections; ++k) {
+      if (!now.usable() || !std::isfinite(norm)) return;
+      const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
+      if (revise_effects(settled, false)) {
+        now = sweeps_.evaluate(report);
+        norm = now.norm;
+        continue;
+      }
+      if (to_the_end ? converged(now, norm, h) || sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons) : settled) break;
+      std::ranges::copy(work_.innovation.flat(), before_innovation_.flat().begin());
+      const double slope_before = sweeps_.slope_along(before_innovation_);
+      now = sweeps_.solve_and_correct(report);
+      double taken = 1;
+      for (int cut = 0; cut < kMaxBacktracks; ++cut) {
+        double share = 0.5;
+        if (now.usable()) {
+          norm = now.norm;
+          const double slope = sweeps_.slope_along(before_innovation_);
+          if (slope > -kSteepest * slope_before) break;
+          share = std::clamp(slope_before / (slope_before - slope), 0.1, 0.9);
+        }
+        now = sweeps_.correct(taken * (share - 1), report);
+        taken *= share;
+      }
+      if (now.usable()) {
+        sweeps_.factor_again(now, report);
+        norm = now.norm;
+      }
+    }
+  }
+}
+
+template <bool kEffects>
+StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int history, double h, StepReport& report) {
+  momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
+  first_guess(options_.guess, model_, state, history, h, sweeps_);
+  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
+  if constexpr (kEffects) begin_effects(state, history, h);
+  Evaluated now = sweeps_.evaluate(report);
+  if (!now.usable()) {
+    // no displacement at all is always within the range of log
+    for (double& value : work_.delta.flat()) value = 0;
+    now = sweeps_.evaluate(report);
+  }
+  double norm = now.norm;
+  bool fresh = true;  // the factor belongs to the current displacement
+  StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
+
+  const auto end = [&](StepStatus status) {
+    const double relative = now.scale > 0 ? std::sqrt(0.5 * norm / now.scale) : std::sqrt(norm);
+    if (status == StepStatus::converged) {
+      momentum_energy_ = now.energy;
+      report.residual = std::max(report.residual, relative);
+    } else {
+      failed_residual_ = relative;
+    }
+    if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_);
+    return status;
+  };
+  const auto try_out = [&](const Evaluated& tried) {
+    now = tried;
+    if (now.usable()) return now.norm;
+    trouble = now.least_w > 0 ? StepStatus::not_finite : StepStatus::past_pi;
+    report.slot = worst_displacement(model_, work_);
+    return kInfinity;
+  };
+
+  // the evaluation and factor for other states of effects, where they changed
+  int revisions = 0;
+  const auto revised = [&]([[maybe_unused]] bool settled) {
+    if constexpr (kEffects) {
+      const bool revises = effects_.plan().revises;
+      if (revises && sweeps_.one_pass() && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
+        // at first only to find the states; where they still do not settle the step stays with friction smooth below the least creep
+        const bool whole = revisions == kMostRevisions;
+        approach_softly(now, norm, h, whole, report);
+        if (!whole) effects_.harden();
+        displacement_map(model_.tree, work_.motion, work_.delta);
+      } else {
+        if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision) return false;
+        if (!revise_effects(settled, revisions >= kBulkRevisions)) return false;
+        report.iterations += 1;
+      }
+      revisions += 1;
+      now = sweeps_.evaluate(report);
+      norm = now.norm;
+      return fresh = true;
+    }
+    return false;
+  };
+
+  bool at_floor = false;
+  for (int iteration = 0;; ++iteration) {
+    if (!std::isfinite(norm) || !now.usable()) {
+      report.slot = worst_displacement(model_, work_);
+      return end(StepStatus::not_finite);
+    }
+    const bool done = at_floor || converged(now, norm, h);
+    if (revised(done || 0.5 * norm <= kSettled * kSettled * now.scale)) {
+      at_floor = false;
+      continue;
+    }
+    if (done && revisions < kLastRevision) {
+      report.at_rounding_floor |= at_floor;
+      return end(StepStatus::converged);
+    }
+    if (iteration >= max_iterations_ || done) return end(StepStatus::not_converged);
+
+    const double before = norm;
+    double taken = 1;
+    norm = try_out(sweeps_.solve_and_correct(report));
+    if (revised(false)) continue;
+    const bool slow = norm > kSlowProgress * kSlowProgress * before;
+    const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.scale;
+    if ((slow && sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) ||
+        (close && !converged(now, norm, h) && sweeps_.at_rounding_floor(now, norm, fall(h), kBareRounding))) {
+      at_floor = true;
+      continue;
+    }
+    for (int cut = 0; !(norm < before) && cut < kMaxBacktracks; ++cut) {
+      taken /= 2;
+      norm = try_out(sweeps_.correct(-taken, report));
+      report.backtracks += 1;
+    }
+    if (!(norm < before)) {
+      norm = try_out(sweeps_.correct(-taken, report));  // back to where this iteration began
+      if (sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) {
+        at_floor = true;
+        continue;
+      }
+      if (fresh || options_.solver == Solver::riqn) return end(trouble);
+    }
+    fresh = false;
+    if (slow && options_.solver == Solver::newton) {
+      sweeps_.factor_again(now, report);
+      norm = now.norm;
+      fresh = true;
+    }
+  }
+}
+
+/// The new state, from a displacement that solves the step.
+template <bool kEffects>
+void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h) {
+  const Tree& tree = model_.tree;
+  const double work_at_begin = work(work_.force);
+  if constexpr (kEffects) {
+    if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
+    if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
+  }
+  for (Index row = 0; row < tree.shape.velocities; ++row) {
+    for (int k = kHistory - 1; k > 0; --k) state.history(row, k) = state.history(row, k - 1);
+    state.history(row, 0) = work_.delta(row);
+  }
+  history = std::min(history + 1, kHistory);
+  advance_map(tree, work_.motion, work_.delta, state.q);
+  for (const Mimic& mimic : sweeps_.mimics()) {
+    state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
+  }
+  sweeps_.arrive(state.q, h, state.p);
+  state.pace(0, 1) = 0.5 * (work_at_begin + work(work_.force));
+  if constexpr (kEffects) {
+    // an impact may take in one step what the next gives back
+    state.pace(0, 0) = std::max(kinetic_, kImpactMemory * state.pace(0, 0));
+    solved_work_.ground -= effects_.ground_stored();
+    effect_work_.add(solved_work_);
+    time_ += h;
+    for (Index row = 0; effects_.plan().joints && row < tree.shape.velocities; ++row) state.p(row) += work_.increment(row);
+  } else {
+    state.pace(0, 0) = kinetic_;
+  }
+  fold_mimics(sweeps_.mimics(), state.p);
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::forget() {
+  if constexpr (kEffects) effects_.forget();
+}
+
+template <bool kEffects>
+Energy TreeStepper<kEffects>::energy_of(const Field<double>& p, Field<double>& rate) {
+  const Field<double>& read = sweeps_.read_velocity(p, rate);
+  double kinetic = 0;
+  for (Index row = 0; row < p.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
+  return {kinetic, sweeps_.potential()};
+}
+
+template <bool kEffects>
+Wrench<double> TreeStepper<kEffects>::total_momentum(const Field<double>& v) {
+  sweeps_.momentum_of(v, work_.increment);
+  return load<Wrench, double>(work_.impulse, 0);
+}
+
+template <>
+std::unique_ptr<Stepper> make_tree_stepper<LINDEN_ACTING>(const Model& model, const Options& options, const EffectPlan& plan) {
+  return std::make_unique<TreeStepper<LINDEN_ACTING>>(model, options, plan);
+}
+
+}  // namespace linden

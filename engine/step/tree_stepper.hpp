@@ -1,0 +1,87 @@
+// engine/step/tree_stepper.hpp
+// The steps of a tree. What is run is in tree_sweeps.hpp; what counts as solved, and what to do where it is not, is here.
+//
+//   momentum_target     h (p + h/2 Q)
+//   first guess         delta
+//   +-> motion_map      M = exp(S delta)
+//   |   displacement_down, momentum_map                         DRNEA, downward half
+//   |   newton_factor_up (once a step) or articulated_inertia_up (riqn)
+//   |   innovation_up (or residual_up, impulse_pass_up)         DRNEA, upward half: h r(delta); its energy norm: usable? converged?
+//   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
+//   advance_map, placement_map, gravity, momentum_update_map
+//
+// Effects (effect_sweeps.hpp) act after momentum_map and on the target, are part of the factor, and have their states - sticks, slides,
+// at a limit - revised between corrections. Compiled with them and without (kEffects): a step without asks for none.
+//
+// The equation may have other roots, far from the motion, once a step is too large for it. Whoever lands on one gains energy out of
+// nothing: kinetic energy of the mean motion minus the work of the forces is compared with the step before.
+#pragma once
+
+#include "engine/step/stepper.hpp"
+#include "engine/step/tree_sweeps.hpp"
+
+namespace linden {
+
+template <bool kEffects>
+class TreeStepper final : public Stepper {
+ public:
+  TreeStepper(const Model& model, const Options& options, const EffectPlan& plan);
+
+  void refresh(const State<double>& state) override { sweeps_.refresh(state.q); }
+  void apply(std::span<const double> force) override { sweeps_.apply(force); }
+  void use(const BodyConstants<double>& constants) override { sweeps_.use(constants); }
+  void forget() override;
+  StepReport step(State<double>& state, int& history, double time, double h) override;
+  const EffectWork<double>& effect_work() const override { return effect_work_; }
+  std::span<double> servo_targets() override;
+  std::span<double> friction_forces() override;
+  double contact(Index k) const override;
+  std::vector<std::span<double>> effect_memory() override;
+  const Field<double>& read_velocity(const Field<double>& p, Field<double>& v) override { return sweeps_.read_velocity(p, v); }
+  void momentum_of(const Field<double>& v, Field<double>& p) override { sweeps_.momentum_of(v, p); }
+  Wrench<double> total_momentum(const Field<double>& v) override;
+  Energy energy_of(const Field<double>& p, Field<double>& rate) override;
+
+ private:
+  bool converged(const Evaluated& now, double norm, double h) const;
+  bool gains_energy(const State<double>& state, double h);
+  double push();
+  void begin_effects(const State<double>& state, int history, double h)
+    requires kEffects;
+  bool revise_effects(bool settled, bool one_by_one)
+    requires kEffects;
+  void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
+    requires kEffects;
+  double fall(double h) const;
+  double work(const Field<double>& force) const;
+  StepStatus solve(const State<double>& state, int history, double h, StepReport& report);
+  StepStatus find_root(const State<double>& state, int history, double h, StepReport& report);
+  bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
+  void finish(State<double>& state, int& history, double h);
+
+  const Model& model_;
+  Options options_;
+  int max_iterations_;
+  TreeSweeps<kEffects> sweeps_;
+  Workspace<double>& work_;
+  EffectsIf<kEffects, double>& effects_;
+  double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
+  double kinetic_ = 0;          // the same in J
+  double failed_residual_ = 0;  // of the last solve that failed
+  EffectWork<double> effect_work_, solved_work_;  // of the whole step; of the root found last
+  Field<double> before_;             // displacement of the step before, as far as it is known [rad, m]
+  Field<double> before_innovation_;  // of approach_softly
+  double time_ = 0;
+  bool known_ = false;  // the last step is one of this stepper
+  State<double> last_good_;
+};
+
+/// See make_stepper.
+template <bool kEffects>
+std::unique_ptr<Stepper> make_tree_stepper(const Model& model, const Options& options, const EffectPlan& plan);
+template <>
+std::unique_ptr<Stepper> make_tree_stepper<false>(const Model& model, const Options& options, const EffectPlan& plan);
+template <>
+std::unique_ptr<Stepper> make_tree_stepper<true>(const Model& model, const Options& options, const EffectPlan& plan);
+
+}  // namespace linden

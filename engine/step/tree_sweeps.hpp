@@ -1,0 +1,127 @@
+// engine/step/tree_sweeps.hpp
+// The sweeps over one instance's tree that a step is made of, with the memory they share: what is run, in parts that stay in the nearest
+// cache. What a solution is, and what to do where there is none, is the stepper's business (stepper.hpp).
+//
+//   evaluate                  delta -> motion, displacement, h mu              DRNEA, downward half
+//                             Jacobian (riqn: articulated inertia), factored
+//                             residual and first half of a solve, its norm     DRNEA, upward half
+//   solve_and_correct         second half of the solve, and the next evaluation with the factor there is
+//
+// One upward sweep finds residual and norm where no joint is tied to another and nobody asks for |r|; else residual, ties and solve go one
+// by one. Effects, where there are any, act in each evaluation and factor; where there are none, each branch of the tree is gone through
+// down and up before the next. What an evaluation finds where a body turned too far is not usable.
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "engine/options.hpp"
+#include "engine/step/effect_sweeps.hpp"
+#include "engine/step_report.hpp"
+#include "kernels/articulated.hpp"
+#include "kernels/mimic.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+
+struct Evaluated {
+  double least_w = 1;  // see displacement_down
+  double energy = 0;   // h^2 x kinetic energy of the mean motion
+  double plain = 0;    // |h r|^2
+  double norm = 0;     // squared energy norm of the residual
+  double scale = 0;    // what a residual is compared with: energy, with effects also what gravity gives in a step
+  bool usable() const { return least_w > 0 && std::isfinite(norm) && std::isfinite(plain) && std::isfinite(energy); }
+};
+
+/// kEffects: with those of the plan, beside gravity.
+template <bool kEffects>
+class TreeSweeps {
+ public:
+  /// The plan must outlive the sweeps.
+  TreeSweeps(const Model& model, const Options& options, const EffectPlan& plan);
+
+  Workspace<double>& work() { return work_; }
+  const Workspace<double>& work() const { return work_; }
+  const BodyConstants<double>& constants() const { return *constants_; }
+  std::span<const Mimic> mimics() const { return ties_.mimics(); }
+  EffectsIf<kEffects, double>& effects() { return effects_; }
+  const EffectsIf<kEffects, double>& effects() const { return effects_; }
+
+  /// Placements, forces and potentials at q.
+  void refresh(const Field<double>& q);
+  /// The same at the end of a step of h, and its momenta p.
+  void arrive(const Field<double>& q, double h, Field<double>& p);
+  /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
+  double potential() const { return potential_; }
+  double effect_potential() const { return effect_potential_; }
+  /// See Stepper.
+  void apply(std::span<const double> force);
+  void use(const BodyConstants<double>& constants) { constants_ = &constants; }
+
+  /// Before the evaluations of a step. known: the step before is one of these sweeps; scale: see Evaluated.
+  void begin(bool known, double scale);
+  /// With a fresh factor.
+  Evaluated evaluate(StepReport& report);
+  /// A fresh factor for the evaluation made last.
+  void factor_again(Evaluated& now, StepReport& report);
+  /// The evaluation after a correction by what the factor makes of the residual.
+  Evaluated solve_and_correct(StepReport& report);
+  /// The evaluation after the correction applied last, times `factor`.
+  Evaluated correct(double factor, StepReport& report);
+
+  /// The residual of each joint as its solve left it [kg m^2, kg m]; with no ties, the innovation.
+  Field<double>& left() { return one_pass_ ? work_.innovation : work_.residual; }
+  const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
+  bool one_pass() const { return one_pass_; }
+  /// u.(d^-1 u_before), summed over the joints, for the innovation of another evaluation with the same factor.
+  double slope_along(const Field<double>& innovation_before) const;
+  /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
+  /// beside the motion, or beside what gravity alone would do to it where all is at rest (fall).
+  bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) const;
+
+  /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
+  void velocity_of(const Field<double>& p, Field<double>& v);
+  void apply_mass_inverse(const Field<double>& p, Field<double>& v);
+  void momentum_of(const Field<double>& v, Field<double>& p);
+  const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
+
+ private:
+  template <class Then>
+  void refresh_and(const Field<double>& q, const Then& then);
+  template <class Motions>
+  Evaluated evaluate_motions(StepReport& report, bool fresh, const Motions& motions);
+  template <class Added>
+  double pass_part(Slots part, bool fresh, const Added& added);
+  template <class Action>
+  void with_added(const Action& action);
+  void act(Evaluated& now);
+  template <class Action>
+  void with_rotors(const Action& action);
+  void forces(Slots part);
+  void pass_up(Evaluated& now, bool fresh);
+  void factor();
+  void factor_mass();
+  void tie_rates();
+  double pass_residual();
+  void pass_down();
+  Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+  Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
+
+  const Model& model_;
+  const BodyConstants<double>* constants_;
+  Options options_;
+  bool has_gravity_;
+  bool one_pass_;
+  double potential_ = 0, effect_potential_ = 0;
+  double effect_scale_ = 0;
+  bool guess_points_ = false;  // no evaluation of this solve has been made yet
+  bool known_ = false;
+  std::vector<double> applied_;  // empty: no force but gravity
+  Workspace<double> work_;
+  MimicTies<double> ties_;
+  [[no_unique_address]] EffectsIf<kEffects, double> effects_;
+  Field<double> read_;  // see read_velocity
+};
+
+}  // namespace linden
