@@ -1,17 +1,10 @@
 #include "engine/step/first_guess.hpp"
 
+#include "engine/step/extrapolation.hpp"
 #include "kernels/impulse_up.hpp"
 #include "kernels/velocity_down.hpp"
 
 namespace linden {
-namespace {
-
-/// Next value of the polynomial through the last 1, ..., 5 values, latest first.
-constexpr double kExtrapolation[kHistory][kHistory] = {
-    {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}, {5, -10, 10, -5, 1},
-};
-
-}  // namespace
 
 template <bool kEffects>
 void first_guess(FirstGuess guess, const Model& model, const State<double>& state, int history, double h, TreeSweeps<kEffects>& sweeps) {
@@ -40,12 +33,7 @@ void first_guess(FirstGuess guess, const Model& model, const State<double>& stat
     }
     case FirstGuess::extrapolation:
       if (history == 0) break;
-      for (Index row = 0; row < n; ++row) {
-        double next = 0;
-        for (int k = 0; k < history; ++k) next += kExtrapolation[history - 1][k] * state.history(row, k);
-        delta(row) = next;
-      }
-      return;
+      return extrapolate(extrapolation(state.history, history), state.history, {0, n}, delta);
   }
   // No displacement is known yet: h M^-1 (p + h/2 Q).
   sweeps.velocity_of(work.momentum_target, delta);

@@ -1,0 +1,74 @@
+#include "engine/step/extrapolation.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "kernels/body_lanes.hpp"
+
+namespace linden {
+namespace {
+
+/// Next value of the polynomial through the last 1, ..., 5 values, latest first.
+constexpr std::array<std::array<double, kHistory>, kHistory> kThrough{{
+    {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}, {5, -10, 10, -5, 1},
+}};
+
+/// Next value of the cubic nearest to the last 5.
+constexpr std::array<double, kHistory> kCubic{3.2, -2.8, -0.8, 2.2, -0.8};
+
+/// Fourth differences of noise are 1.87 times third ones; a motion that whips has such moments, but few.
+constexpr double kNoise = 1.4;
+
+/// Third differences below this share of the displacements leave no correction that rounding could matter to.
+constexpr double kMuch = 3e-5;
+
+/// Rows that are looked at, of histories with so many more that it does not show in the time of a step.
+constexpr Index kSample = 128, kFewest = 8 * kSample;
+
+/// Whether much of history is noise, from its third difference on.
+bool is_noise(const Field<double, kHistory>& history) {
+  double latest = 0, third = 0, fourth = 0;
+  for (Index row = 0; row < history.rows(); row += history.rows() / kSample) {
+    const double* const d = history.row(row);
+    const double now = d[0] - 3 * d[1] + 3 * d[2] - d[3], before = d[1] - 3 * d[2] + 3 * d[3] - d[4];
+    latest += d[0] * d[0];
+    third += now * now;
+    fourth += (now - before) * (now - before);
+  }
+  return fourth > kNoise * kNoise * third && third > kMuch * kMuch * latest;
+}
+
+}  // namespace
+
+Extrapolation extrapolation(const Field<double, kHistory>& history, int terms) {
+  const bool cubic = terms == kHistory && history.rows() >= kFewest && is_noise(history);
+  return {cubic ? kCubic : kThrough[static_cast<std::size_t>(terms - 1)], terms};
+}
+
+void extrapolate(const Extrapolation& guess, const Field<double, kHistory>& history, Slots rows, Field<double>& delta) {
+  Index row = rows.begin;
+  if (guess.terms == kHistory) {
+    for (; row + kBodies <= rows.end; row += kBodies) {
+      BodyPack past[kHistory];
+      turning::rows_to_lanes<kHistory>([&](int l) LINDEN_INLINE_LAMBDA { return history.row(row + l); }, past);
+      BodyPack next = guess.shares[0] * past[0];
+      for (std::size_t k = 1; k < kHistory; ++k) next = next + guess.shares[k] * past[k];
+      next.store_unaligned(delta.row(row));
+    }
+  }
+  for (; row < rows.end; ++row) {
+    double next = 0;
+    for (int k = 0; k < guess.terms; ++k) next += guess.shares[static_cast<std::size_t>(k)] * history(row, k);
+    delta(row) = next;
+  }
+}
+
+void remember(const Field<double>& delta, Slots rows, Field<double, kHistory>& history) {
+  for (Index row = rows.begin; row < rows.end; ++row) {
+    double* const past = history.row(row);
+    std::memmove(past + 1, past, (kHistory - 1) * sizeof(double));
+    past[0] = delta(row);
+  }
+}
+
+}  // namespace linden
