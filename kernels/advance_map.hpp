@@ -37,10 +37,15 @@ LINDEN_INLINE void advance(Joint<Kind>, Index row, const S& delta, const Displac
 }
 
 template <class S>
-void advance_map(const Tree& tree, const Field<S, 7>& motion, const Field<S>& delta, Field<S>& q) {
-  down(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
-    advance(joint, tree.first_q(i), delta(tree.first_v(i)), load<Displacement, S>(motion, i), q);
+void advance_map(const Tree& tree, const Field<S, 7>& motion, const Field<S>& delta, Slots slots, Field<S>& q) {
+  down(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+    advance(joint, tree.first_q(i), delta(tree.first_v(i)), load<Displacement, S>(motion, slots.row(i)), q);
   });
+}
+
+template <class S>
+void advance_map(const Tree& tree, const Field<S, 7>& motion, const Field<S>& delta, Field<S>& q) {
+  advance_map(tree, motion, delta, all_slots(tree), q);
 }
 
 }  // namespace linden

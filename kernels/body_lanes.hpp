@@ -146,7 +146,7 @@ LINDEN_INLINE void for_abreast_down(const Tree& tree, Slots slots, const Many& m
     } else {
       const Index begin = i++;
       while (i < slots.end && !wide(i)) ++i;
-      few(Slots{begin, i});
+      few(slots.part(begin, i));
     }
   }
 }
@@ -163,7 +163,7 @@ LINDEN_INLINE void for_abreast_up(const Tree& tree, Slots slots, const Many& man
     } else {
       const Index end = i--;
       while (i > slots.begin && !wide(i)) --i;
-      few(Slots{i, end});
+      few(slots.part(i, end));
     }
   }
 }
@@ -186,6 +186,14 @@ LINDEN_INLINE Value<BodyPack> gather_at(ManyBodies, const Field<double, Componen
   std::array<BodyPack, Components> lanes;
   turning::rows_to_lanes<Components>([&](int l) LINDEN_INLINE_LAMBDA { return field.row(at[l]); }, lanes.data());
   return Value<BodyPack>::from(lanes.data());
+}
+
+/// Where the parents of bodies i ... i + W - 1 lie.
+LINDEN_INLINE std::array<Index, static_cast<std::size_t>(kBodies)> rows_of_parents(const Tree& tree, Slots slots, Index i) {
+  std::array<Index, static_cast<std::size_t>(kBodies)> rows;
+  const Index* const parent = tree.parent.row(i);
+  for (int l = 0; l < kBodies; ++l) rows[static_cast<std::size_t>(l)] = slots.row_of_parent(parent[l]);
+  return rows;
 }
 
 template <int Components, class Value>

@@ -48,23 +48,23 @@ S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field
   if (slots.begin == 1) store(displacement, 0, Displacement<S>{{{zero, zero, zero}, one}, {zero, zero, zero}});
   S least = one;
   const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
-    auto D = load<Displacement, S>(displacement, part.begin - 1);  // of the body before, often the parent
+    auto D = load<Displacement, S>(displacement, slots.row_of_parent(part.begin - 1));  // of the body before, often the parent
     for (Index i = part.begin; i < part.end; ++i) {
-      const auto M = load<Displacement, S>(motion, i);
+      const auto M = load<Displacement, S>(motion, slots.row(i));
       const Index parent = tree.parent(i);
-      if (parent != i - 1) D = load<Displacement, S>(displacement, parent);
+      if (parent != i - 1) D = load<Displacement, S>(displacement, slots.row_of_parent(parent));
       D = moved(joint, D, load<Placement, S>(placement, i), M);
-      store(displacement, i, D);
+      store(displacement, slots.row(i), D);
       least = min(least, min(D.r.w, M.r.w));
     }
   };
   stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (std::is_same_v<S, double>) {
       const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
-        const auto M = gather<Displacement>(bodies, motion, i);
-        const auto above = gather_at<Displacement>(bodies, displacement, tree.parent.row(i));
+        const auto M = gather<Displacement>(bodies, motion, slots.row(i));
+        const auto above = gather_at<Displacement>(bodies, displacement, rows_of_parents(tree, slots, i).data());
         const auto next = moved(joint, above, gather<Placement>(bodies, placement, i), M);
-        scatter(bodies, displacement, i, next);
+        scatter(bodies, displacement, slots.row(i), next);
         least = min(least, least_of(bodies, min(next.r.w, M.r.w)));
       };
       for_abreast_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });

@@ -8,7 +8,8 @@
 //
 // reads   screw 2 x n, placement 12 x n, (motion 7 x n,) gains, innovation nv (u)
 // writes  variation 6 x n (eta), increment nv (Delta)
-// slots   [begin, end) in order, begin = 1 first
+// slots   [begin, end) in order, begin = 1 first; of parts only what is read again is written: not the eta of a body whose only child
+//         comes next, which takes it from the registers
 // cost    one pass; screws of one level fill the lanes where there are enough of them
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3, pass 3, for impulses
 #pragma once
@@ -38,28 +39,29 @@ LINDEN_INLINE Wrench<S> joint_increment(Joint<Kind> joint, const Tree& tree, con
   return delta;
 }
 
-template <class S, class PlacementOf, class Element>
+template <bool EachEta, class S, class PlacementOf, class Element>
 void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Gains<S>& gains,
                 const Field<S>& innovation, Slots slots, Field<S, 6>& variation, Field<S>& increment) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   if (slots.begin == 1) store(variation, 0, Twist<S>{zero, zero});
   const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
-    auto eta = load<Twist, S>(variation, part.begin - 1);  // of the body before, often the parent
+    auto eta = load<Twist, S>(variation, slots.row_of_parent(part.begin - 1));  // of the body before, often the parent
     for (Index i = part.begin; i < part.end; ++i) {
       const Index row = tree.first_v(i), parent = tree.parent(i);
-      if (parent != i - 1) eta = load<Twist, S>(variation, parent);
+      if (parent != i - 1) eta = load<Twist, S>(variation, slots.row_of_parent(parent));
       const Twist<S> xi = to_child(placement_of(joint, OneBody<S>{}, i), eta);
       const Wrench<S> delta = joint_increment(joint, tree, gains, i, load_joint(joint, innovation, row), xi);
       store_joint(joint, increment, row, delta);
       eta = add_motion(joint, constants, i, delta, xi);
-      store(variation, i, eta);
+      const bool handed_on = !EachEta && i + 1 < part.end && tree.parent(i + 1) == i && tree.is_last_child(i + 1) != 0;
+      if (!handed_on) store(variation, slots.row(i), eta);
     }
   };
   stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw && std::is_same_v<S, double>) {
       const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
         const Index row = tree.first_v(i);
-        const auto above = gather_at<Twist>(bodies, variation, tree.parent.row(i));
+        const auto above = gather_at<Twist>(bodies, variation, rows_of_parents(tree, slots, i).data());
         const auto xi = to_child(placement_of(joint, bodies, i), above);
         const auto gain = gather<Twist>(bodies, gains.down, row);
         const auto delta = gather_row(bodies, gains.inverse, tree.first_block(i)) * gather_row(bodies, innovation, row) -
@@ -69,7 +71,7 @@ void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const
         auto next = xi;
         next.w.z = xi.w.z + screw.r * delta;
         next.v.z = xi.v.z + screw.t * delta;
-        scatter(bodies, variation, i, next);
+        scatter(bodies, variation, slots.row(i), next);
       };
       for_abreast_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {
@@ -78,28 +80,28 @@ void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const
   });
 }
 
-template <class S, class Element>
+template <bool EachEta = false, class S, class Element>
 void increment_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                     const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Slots slots,
                     Field<S, 6>& variation, Field<S>& increment) {
   const auto placement_of = [&](auto joint, auto bodies, Index i) LINDEN_INLINE_LAMBDA {
-    return after_motion(joint, gather<Placement>(bodies, placement, i), gather<Displacement>(bodies, motion, i));
+    return after_motion(joint, gather<Placement>(bodies, placement, i), gather<Displacement>(bodies, motion, slots.row(i)));
   };
-  yield_down(tree, constants, placement_of, gains, innovation, slots, variation, increment);
+  yield_down<EachEta>(tree, constants, placement_of, gains, innovation, slots, variation, increment);
 }
 
 template <class S, class Element>
 void increment_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
                     const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Field<S, 6>& variation,
                     Field<S>& increment) {
-  increment_down(tree, constants, placement, motion, gains, innovation, all_slots(tree), variation, increment);
+  increment_down<true>(tree, constants, placement, motion, gains, innovation, all_slots(tree), variation, increment);
 }
 
 template <class S, class Element>
 void rate_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
                const Field<S>& innovation, Field<S, 6>& variation, Field<S>& rate) {
   const auto placement_of = [&](auto, auto bodies, Index i) LINDEN_INLINE_LAMBDA { return gather<Placement>(bodies, placement, i); };
-  yield_down(tree, constants, placement_of, gains, innovation, all_slots(tree), variation, rate);
+  yield_down<true>(tree, constants, placement_of, gains, innovation, all_slots(tree), variation, rate);
 }
 
 }  // namespace linden

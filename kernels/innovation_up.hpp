@@ -36,34 +36,37 @@ void clear_world(Field<S, 6>& impulse) {
 template <class S>
 class Climbing {
  public:
-  Climbing(Field<S, 6>& impulse, Slots slots) : impulse_(impulse), end_(slots.begin) {
+  Climbing(Field<S, 6>& impulse, Slots slots) : impulse_(impulse), slots_(slots) {
     const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
     none_ = waiting_ = {zero, zero};
   }
   /// The body's own impulse and all that its children passed.
   LINDEN_INLINE Wrench<S> arrived(Index i) {
-    const Wrench<S> sum = load<Wrench, S>(impulse_, i) + waiting_;
-    store(impulse_, i, sum);
+    const Index row = slots_.row(i);
+    const Wrench<S> sum = load<Wrench, S>(impulse_, row) + waiting_;
+    store(impulse_, row, sum);
     return sum;
   }
   /// Bodies up to i are next, several at once: all that goes up is to be in memory.
   LINDEN_INLINE void unload(Index i) {
-    store(impulse_, i, load<Wrench, S>(impulse_, i) + waiting_);
+    const Index row = slots_.row(i);
+    store(impulse_, row, load<Wrench, S>(impulse_, row) + waiting_);
     waiting_ = none_;
   }
   LINDEN_INLINE void pass(const Tree& tree, Index i, const Wrench<S>& passed) {
     const Index parent = tree.parent(i);
-    if (parent == i - 1 && i > end_) {
+    if (parent == i - 1 && i > slots_.begin) {
       waiting_ = passed;
     } else {
       waiting_ = none_;
-      store(impulse_, parent, load<Wrench, S>(impulse_, parent) + passed);
+      const Index row = slots_.row_of_parent(parent);
+      store(impulse_, row, load<Wrench, S>(impulse_, row) + passed);
     }
   }
 
  private:
   Field<S, 6>& impulse_;
-  Index end_;
+  Slots slots_;
   Wrench<S> none_, waiting_;
 };
 
@@ -90,13 +93,13 @@ template <class S, class Element>
         using std::abs;
         climbing.unload(i + kBodies - 1);
         const Index row = tree.first_v(i);
-        const auto E = gather<Wrench>(bodies, work.impulse, i);
+        const auto E = gather<Wrench>(bodies, work.impulse, slots.row(i));
         const auto screw = gather<Screw>(bodies, constants.screw, i);
         const auto u = screw.r * E.n.z + screw.t * E.f.z - gather_row(bodies, work.momentum_target, row);
         scatter_row(bodies, work.innovation, row, u);
         norm = norm + summed(bodies, abs(u * gather_row(bodies, gains.inverse, tree.first_block(i)) * u));
         const auto passed = E - u * gather<Wrench>(bodies, gains.up, row);
-        add_at(bodies, work.impulse, tree.parent.row(i), to_parent(gather<Placement>(bodies, work.placement, i), passed));
+        add_at(bodies, work.impulse, rows_of_parents(tree, slots, i).data(), to_parent(gather<Placement>(bodies, work.placement, i), passed));
       };
       for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {

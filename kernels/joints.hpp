@@ -33,12 +33,18 @@ LINDEN_INLINE void with_joint(JointKind kind, Body&& body) {
 
 inline Slots all_slots(const Tree& tree) { return {1, tree.shape.slots}; }
 
+/// Rows of the velocities of some bodies.
+inline Slots velocities(const Tree& tree, Slots slots) {
+  if (slots.begin == slots.end) return {0, 0};
+  return {tree.first_v(slots.begin), slots.end < tree.shape.slots ? tree.first_v(slots.end) : tree.shape.velocities};
+}
+
 /// stretch(joint, slots) for every stretch of one kind, root to leaves.
 template <class Stretch>
 LINDEN_INLINE void stretches(const Tree& tree, Slots slots, Stretch&& stretch) {
   for (Index begin = slots.begin; begin < slots.end;) {
     const Run& run = tree.runs[static_cast<std::size_t>(tree.run(begin))];
-    const Slots part{begin, std::min(run.end, slots.end)};
+    const Slots part = slots.part(begin, std::min(run.end, slots.end));
     with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
     begin = part.end;
   }
@@ -49,7 +55,7 @@ template <class Stretch>
 LINDEN_INLINE void stretches_up(const Tree& tree, Slots slots, Stretch&& stretch) {
   for (Index end = slots.end; end > slots.begin;) {
     const Run& run = tree.runs[static_cast<std::size_t>(tree.run(end - 1))];
-    const Slots part{std::max(run.begin, slots.begin), end};
+    const Slots part = slots.part(std::max(run.begin, slots.begin), end);
     with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
     end = part.begin;
   }

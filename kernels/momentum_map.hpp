@@ -41,8 +41,8 @@ S momentum_map(const Tree&, const BodyConstants<Element>& constants, const Field
   S energy(0.0);
   for_bodies<S>(slots.begin, slots.end, [&](auto bodies, Index i) {
     using B = typename decltype(bodies)::Scalar;
-    const auto body = body_momentum_of(gather<Inertia>(bodies, constants.inertia, i), gather<Displacement>(bodies, displacement, i));
-    scatter(bodies, impulse, i, body.mu);
+    const auto body = body_momentum_of(gather<Inertia>(bodies, constants.inertia, i), gather<Displacement>(bodies, displacement, slots.row(i)));
+    scatter(bodies, impulse, slots.row(i), body.mu);
     energy = energy + summed(bodies, B(0.5) * dot(body.m, body.u));
   });
   return energy;

@@ -3,6 +3,7 @@
 //
 //   momentum_target_map  h (p^k + h/2 Q^k)                                   what h mu must sum up to
 //   momentum_update_map  p^k+1 = (S^T Ad_{dT_i}^T h F_i - C h r) / h + h/2 Q^k+1,    C = Ad_{dT}^T on the joint's rows
+//   momentum_seen_map    h (p^k+1 - h/2 Q^k+1), while F and dT are at hand; momentum_end_map: the rest
 //
 // The momentum of body j seen from the end of the step, nu_j = Ad_{exp(hV_j)}^T mu_j = dlog_{-hV_j}^T G_j V_j, is the same wrench in
 // space as mu_j; so is its sum over a subtree, and F_i of the last evaluation has only to be seen from where body i is now. No second
@@ -26,10 +27,43 @@
 namespace linden {
 
 template <class S>
-void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum, const Field<S>& force, Field<S>& target) {
-  for (Index row = 0; row < tree.shape.velocities; ++row) {
+void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum, const Field<S>& force, Slots slots, Field<S>& target) {
+  const Slots rows = velocities(tree, slots);
+  for (Index row = rows.begin; row < rows.end; ++row) {
     target(row) = h * (momentum(row) + (S(0.5) * h) * force(row));
   }
+}
+
+template <class S>
+void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum, const Field<S>& force, Field<S>& target) {
+  momentum_target_map(tree, h, momentum, force, all_slots(tree), target);
+}
+
+template <class S, class Element>
+void momentum_seen_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 7>& displacement,
+                       const Field<S, 6>& impulse, const Field<S>& residual, Slots slots, Field<S>& seen) {
+  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    if constexpr (joint == JointKind::screw) {
+      const Index shift = tree.first_v(part.begin) - part.begin;
+      for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
+        const auto F = carried(gather<Displacement>(bodies, displacement, slots.row(i)), gather<Wrench>(bodies, impulse, slots.row(i)));
+        const auto screw = gather<Screw>(bodies, constants.screw, i);
+        scatter_row(bodies, seen, i + shift, screw.r * F.n.z + screw.t * F.f.z - gather_row(bodies, residual, i + shift));
+      });
+    } else {
+      for (Index i = part.begin; i < part.end; ++i) {
+        const Index row = tree.first_v(i);
+        const auto D = load<Displacement, S>(displacement, slots.row(i));
+        store_joint(joint, seen, row, carried(D, load<Wrench, S>(impulse, slots.row(i)) - load_joint(joint, residual, row)));
+      }
+    }
+  });
+}
+
+template <class S>
+void momentum_end_map(const Tree& tree, const S& h, const Field<S>& seen, const Field<S>& force, Slots slots, Field<S>& momentum) {
+  const Slots rows = velocities(tree, slots);
+  for (Index row = rows.begin; row < rows.end; ++row) momentum(row) = seen(row) / h + (S(0.5) * h) * force(row);
 }
 
 template <class S, class Element>

@@ -45,11 +45,11 @@ void motion_map(const Tree& tree, const BodyConstants<Element>& constants, const
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
-        scatter(bodies, motion, i, screw_motion(gather<Screw>(bodies, constants.screw, i), gather_row(bodies, delta, i + shift)));
+        scatter(bodies, motion, slots.row(i), screw_motion(gather<Screw>(bodies, constants.screw, i), gather_row(bodies, delta, i + shift)));
       });
     } else {
       for (Index i = part.begin; i < part.end; ++i) {
-        store(motion, i, joint_motion(joint, constants, i, tree.first_v(i), delta, S(1.0)));
+        store(motion, slots.row(i), joint_motion(joint, constants, i, tree.first_v(i), delta, S(1.0)));
       }
     }
   });
@@ -65,12 +65,12 @@ void correct_motion_map(const Tree& tree, const BodyConstants<Element>& constant
         using B = typename decltype(bodies)::Scalar;
         const B better = gather_row(bodies, delta, i + shift) - as<B>(factor) * gather_row(bodies, increment, i + shift);
         scatter_row(bodies, delta, i + shift, better);
-        scatter(bodies, motion, i, screw_motion(gather<Screw>(bodies, constants.screw, i), better));
+        scatter(bodies, motion, slots.row(i), screw_motion(gather<Screw>(bodies, constants.screw, i), better));
       });
     } else {
       for (Index i = part.begin; i < part.end; ++i) {
-        const auto M = load<Displacement, S>(motion, i);
-        store(motion, i, M * joint_motion(joint, constants, i, tree.first_v(i), increment, -factor));
+        const auto M = load<Displacement, S>(motion, slots.row(i));
+        store(motion, slots.row(i), M * joint_motion(joint, constants, i, tree.first_v(i), increment, -factor));
       }
     }
   });

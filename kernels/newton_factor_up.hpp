@@ -26,18 +26,18 @@
 
 namespace linden {
 
-/// K of bodies begin, begin + 1, ..., each by rows, on odd levels by columns, kRowNumbers a body.
-inline void pose_derivative_rows(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 7>& displacement, Index begin,
-                                 Index end, double* rows) {
-  for_bodies<double>(begin, end, [&](auto bodies, Index i) {
+/// K of bodies, each by rows, on odd levels by columns, kRowNumbers a body.
+inline void pose_derivative_rows(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 7>& displacement, Slots slots,
+                                 double* rows) {
+  for_bodies<double>(slots.begin, slots.end, [&](auto bodies, Index i) {
     using S = typename decltype(bodies)::Scalar;
     const auto G = gather<Inertia>(bodies, constants.inertia, i);
-    const auto u = log(gather<Displacement>(bodies, displacement, i));
+    const auto u = log(gather<Displacement>(bodies, displacement, slots.row(i)));
     const auto K = pose_derivative(G, u, G * u);
     S a[36];
     K.to(a);
     const auto odd = odd_levels(bodies, tree, i);
-    double* const to = rows + (i - begin) * kRowNumbers;
+    double* const to = rows + (i - slots.begin) * kRowNumbers;
     for (int row = 0; row < 6; ++row) {
       S numbers[6];
       for (int column = 0; column < 6; ++column) {
@@ -93,7 +93,7 @@ LINDEN_INLINE Rows6 pass_joint(Joint<Kind> joint, const Tree& tree, const BodyCo
 /// Screws i ... i + W - 1 of one level, each in a lane: their gains, and to their parents what they pass.
 template <bool ByColumns, class Added>
 void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
-                    const Field<double, 7>& motion, const Field<double, 7>& displacement, Index i,
+                    const Field<double, 7>& motion, const Field<double, 7>& displacement, Slots slots, Index i,
                     Field<double, kRowNumbers>& articulated, const Gains<double>& gains, const Added& added) {
   constexpr ManyBodies bodies;
   /// Where number k of row `line` is in a Mat6.
@@ -101,7 +101,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
     return by_columns ? row_start(k) + column_start(line) : row_start(line) + column_start(k);
   };
   BodyPack A[36], felt[36];
-  const auto u = log(gather<Displacement>(bodies, displacement, i));
+  const auto u = log(gather<Displacement>(bodies, displacement, slots.row(i)));
   const auto G = gather<Inertia>(bodies, constants.inertia, i);
   pose_derivative(G, u, G * u).to(A);
   settle();
@@ -125,7 +125,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
   eliminate_screw(bodies, tree, constants, i, A, gains, felt, added);
   settle();
   const auto X = gather<Placement>(bodies, placement, i);
-  const auto X_pose = after_motion(Joint<JointKind::screw>{}, X, gather<Displacement>(bodies, motion, i));
+  const auto X_pose = after_motion(Joint<JointKind::screw>{}, X, gather<Displacement>(bodies, motion, slots.row(i)));
   to_parent(X, X_pose, felt, [&](int at, const BodyPack& value) LINDEN_INLINE_LAMBDA { A[at] = value; });
   settle();
   alignas(kAlignment) double passed[kBodies * kRowNumbers];
@@ -162,7 +162,7 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
         // full registers of bodies; no more where those that follow are factored abreast
         const Index most = is_wide(tree, i) ? (i - part.begin) / kBodies * kBodies + kBodies : kTile;
         tile = std::max(slots.begin, i + 1 - std::min(kTile, most));
-        pose_derivative_rows(tree, constants, displacement, tile, i + 1, K);
+        pose_derivative_rows(tree, constants, displacement, slots.part(tile, i + 1), K);
       }
       Rows6 A;
       for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + waiting.r[k];
@@ -173,7 +173,7 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
         for (int k = 0; k < 6; ++k) A.r[k] += turned.r[k];
       }
       const auto X = load<Placement, double>(placement, i);
-      const auto X_pose = after_motion(joint, X, load<Displacement, double>(motion, i));
+      const auto X_pose = after_motion(joint, X, load<Displacement, double>(motion, slots.row(i)));
       Rows6 passed;
       if constexpr (joint == JointKind::screw) {
         double after[12];
@@ -199,7 +199,7 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
     if constexpr (joint == JointKind::screw) {
       const auto many = [&](auto, Index i) LINDEN_INLINE_LAMBDA {
         const auto factor = tree.level(i) % 2 != 0 ? factor_abreast<true, Added> : factor_abreast<false, Added>;
-        factor(tree, constants, placement, motion, displacement, i, articulated, gains, added);
+        factor(tree, constants, placement, motion, displacement, slots, i, articulated, gains, added);
       };
       for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {

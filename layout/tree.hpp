@@ -46,9 +46,15 @@ inline constexpr Index kTwig = 32;
 constexpr Index position_count(JointKind kind) { return kind == JointKind::screw ? 1 : kind == JointKind::ball ? 4 : 7; }
 constexpr Index velocity_count(JointKind kind) { return kind == JointKind::screw ? 1 : kind == JointKind::ball ? 3 : 6; }
 
-/// Slots [begin, end).
+/// Slots [begin, end). Arrays of what is made and used up within one way over a branch and back hold the trunk and one branch at a time,
+/// so that they never leave the cache: there bodies from slot `branch` on lie `back` rows lower. 0: every body has a row of its own.
 struct Slots {
   Index begin, end;
+  Index branch = 0, back = 0;
+  /// Row of a body among these, and of one of these or of the trunk.
+  Index row(Index i) const { return i - back; }
+  Index row_of_parent(Index i) const { return i < branch ? i : i - back; }
+  Slots part(Index first, Index last) const { return {first, last, branch, back}; }
   bool operator==(const Slots&) const = default;
 };
 

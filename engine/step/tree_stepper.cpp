@@ -7,7 +7,6 @@
 #include "engine/step/convergence.hpp"
 #include "engine/step/diagnosis.hpp"
 #include "engine/step/first_guess.hpp"
-#include "kernels/advance_map.hpp"
 #include "kernels/momentum_update_map.hpp"
 #include "kernels/motion_map.hpp"
 
@@ -167,16 +166,9 @@ template <bool kEffects>
 StepStatus TreeStepper<kEffects>::solve(const State<double>& state, int history, double h, StepReport& report) {
   const StepStatus status = find_root(state, history, h, report);
   if (status != StepStatus::converged || !gains_energy(state, h)) return status;
+  sweeps_.complete();
   report.slot = fastest_body(model_, sweeps_.constants(), work_);
   return StepStatus::gains_energy;
-}
-
-/// Work of a force along the displacement of the step [J].
-template <bool kEffects>
-double TreeStepper<kEffects>::work(const Field<double>& force) const {
-  double sum = 0;
-  for (Index row = 0; row < model_.tree.shape.velocities; ++row) sum += force(row) * work_.delta(row);
-  return sum;
 }
 
 /// Discrete energy, -dL_d/dh, is kinetic energy of the mean motion plus the mean potential of both ends: between neighbouring steps it
@@ -186,7 +178,8 @@ bool TreeStepper<kEffects>::gains_energy(const State<double>& state, double h) {
   displacement_map(model_.tree, work_.motion, work_.delta);
   kinetic_ = momentum_energy_ / (h * h);
   const double before = state.pace(0, 0);
-  double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + work(work_.force));
+  force_work_ = sweeps_.force_work(all_slots(model_.tree));
+  double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + force_work_);
   if constexpr (kEffects) {
     solved_work_ = effects_.work(sweeps_.left(), work_.delta, before_, known_);
     // forces that nearly balance leave less kinetic energy than their works, taken half a step apart, differ by
@@ -260,11 +253,17 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
 
 template <bool kEffects>
 StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int history, double h, StepReport& report) {
-  momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
-  first_guess(options_.guess, model_, state, history, h, sweeps_);
-  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
-  if constexpr (kEffects) begin_effects(state, history, h);
-  Evaluated now = sweeps_.evaluate(report);
+  Evaluated now;
+  if (!kEffects && options_.guess == FirstGuess::extrapolation && history > 0 && sweeps_.mimics().empty()) {
+    // of each part of the tree when its turn comes
+    now = sweeps_.evaluate_from(state, extrapolation(state.history, history), h, report);
+  } else {
+    momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
+    first_guess(options_.guess, model_, state, history, h, sweeps_);
+    spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
+    if constexpr (kEffects) begin_effects(state, history, h);
+    now = sweeps_.evaluate(report);
+  }
   if (!now.usable()) {
     // no displacement at all is always within the range of log
     for (double& value : work_.delta.flat()) value = 0;
@@ -289,6 +288,7 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
     now = tried;
     if (now.usable()) return now.norm;
     trouble = now.least_w > 0 ? StepStatus::not_finite : StepStatus::past_pi;
+    sweeps_.complete();
     report.slot = worst_displacement(model_, work_);
     return kInfinity;
   };
@@ -320,6 +320,7 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
   bool at_floor = false;
   for (int iteration = 0;; ++iteration) {
     if (!std::isfinite(norm) || !now.usable()) {
+      sweeps_.complete();
       report.slot = worst_displacement(model_, work_);
       return end(StepStatus::not_finite);
     }
@@ -370,30 +371,19 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
 /// The new state, from a displacement that solves the step.
 template <bool kEffects>
 void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h) {
-  const Tree& tree = model_.tree;
-  const double work_at_begin = work(work_.force);
   if constexpr (kEffects) {
     if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
-  for (Index row = 0; row < tree.shape.velocities; ++row) {
-    for (int k = kHistory - 1; k > 0; --k) state.history(row, k) = state.history(row, k - 1);
-    state.history(row, 0) = work_.delta(row);
-  }
   history = std::min(history + 1, kHistory);
-  advance_map(tree, work_.motion, work_.delta, state.q);
-  for (const Mimic& mimic : sweeps_.mimics()) {
-    state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
-  }
-  sweeps_.arrive(state.q, h, state.p);
-  state.pace(0, 1) = 0.5 * (work_at_begin + work(work_.force));
+  state.pace(0, 1) = 0.5 * (force_work_ + sweeps_.arrive(h, state));
   if constexpr (kEffects) {
     // an impact may take in one step what the next gives back
     state.pace(0, 0) = std::max(kinetic_, kImpactMemory * state.pace(0, 0));
     solved_work_.ground -= effects_.ground_stored();
     effect_work_.add(solved_work_);
     time_ += h;
-    for (Index row = 0; effects_.plan().joints && row < tree.shape.velocities; ++row) state.p(row) += work_.increment(row);
+    for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.increment(row);
   } else {
     state.pace(0, 0) = kinetic_;
   }

@@ -2,7 +2,7 @@
 // The steps of a tree. What is run is in tree_sweeps.hpp; what counts as solved, and what to do where it is not, is here.
 //
 //   momentum_target     h (p + h/2 Q)
-//   first guess         delta
+//   first guess         delta; both on the way down of the first evaluation where nothing else needs them before
 //   +-> motion_map      M = exp(S delta)
 //   |   displacement_down, momentum_map                         DRNEA, downward half
 //   |   newton_factor_up (once a step) or articulated_inertia_up (riqn)
@@ -53,7 +53,6 @@ class TreeStepper final : public Stepper {
   void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
     requires kEffects;
   double fall(double h) const;
-  double work(const Field<double>& force) const;
   StepStatus solve(const State<double>& state, int history, double h, StepReport& report);
   StepStatus find_root(const State<double>& state, int history, double h, StepReport& report);
   bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
@@ -67,6 +66,7 @@ class TreeStepper final : public Stepper {
   EffectsIf<kEffects, double>& effects_;
   double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
   double kinetic_ = 0;          // the same in J
+  double force_work_ = 0;       // of the forces at the beginning along its displacement [J]
   double failed_residual_ = 0;  // of the last solve that failed
   EffectWork<double> effect_work_, solved_work_;  // of the whole step; of the root found last
   Field<double> before_;             // displacement of the step before, as far as it is known [rad, m]

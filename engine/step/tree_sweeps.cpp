@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/step/convergence.hpp"
+#include "kernels/advance_map.hpp"
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/displacement_down.hpp"
 #include "kernels/gravity.hpp"
@@ -30,25 +31,50 @@ constexpr Index kPart = kBranch;
 /// action(part) for parts of some slots, root to leaves: all sweeps of an action over as many bodies as stay in the nearest cache.
 template <class Action>
 void in_parts_down(Slots slots, const Action& action) {
-  for (Index begin = slots.begin; begin < slots.end; begin += kPart) action(Slots{begin, std::min(begin + kPart, slots.end)});
+  for (Index begin = slots.begin; begin < slots.end; begin += kPart) action(slots.part(begin, std::min(begin + kPart, slots.end)));
 }
 
 template <class Action>
 void in_parts_up(Slots slots, const Action& action) {
-  for (Index end = slots.end; end > slots.begin; end -= kPart) action(Slots{std::max(slots.begin, end - kPart), end});
+  for (Index end = slots.end; end > slots.begin; end -= kPart) action(slots.part(std::max(slots.begin, end - kPart), end));
 }
 
-/// All of a tree down and up again, each branch both ways while it is in the cache. The last comes first: bodies of the trunk meet their
-/// children in the order of a sweep over the whole tree.
+enum class Branches { last_first, first_first };
+
+/// All of a tree down and up again, each branch both ways while it is in the cache. Where the last comes first, bodies of the trunk meet
+/// their children in the order of a sweep over the whole tree, which Tree::is_last_child and Tree::waiting ask for. share: branches take
+/// the same rows of arrays, see Slots.
 template <class Down, class Up>
-void down_and_up(const Tree& tree, const Down& down, const Up& up) {
+void down_and_up(const Tree& tree, Branches order, bool share, const Down& down, const Up& up) {
   if (tree.trunk.begin == tree.trunk.end) down(tree.trunk);  // what starts at the world
   in_parts_down(tree.trunk, down);
-  for (auto branch = tree.branches.rbegin(); branch != tree.branches.rend(); ++branch) {
-    in_parts_down(*branch, down);
-    in_parts_up(*branch, up);
+  const auto both_ways = [&](Slots slots) {
+    if (share) slots.branch = slots.begin, slots.back = slots.begin - tree.trunk.end;
+    in_parts_down(slots, down);
+    in_parts_up(slots, up);
+  };
+  if (order == Branches::first_first) {
+    std::ranges::for_each(tree.branches, both_ways);
+  } else {
+    std::for_each(tree.branches.rbegin(), tree.branches.rend(), both_ways);
   }
   in_parts_up(tree.trunk, up);
+}
+
+/// Whether branches are to share rows. Motions of screws follow from delta; others are corrected from one evaluation to the next and need
+/// rows of their own. A step of a binary tree of 65,535 has 7 lines of memory a body to wait for so, and 16 with a row for every body.
+bool shares_rows(const Tree& tree) {
+  return !tree.branches.empty() && tree.trunk.end + kBranch <= tree.shape.slots / 2 && tree.runs.size() == 1 &&
+         tree.runs.front().kind == JointKind::screw;
+}
+
+/// Whether this is one long chain: all trunk but for its end.
+bool is_long_chain(const Tree& tree) {
+  if (tree.branches.empty()) return false;
+  for (Index i = 1; i < tree.shape.slots; ++i) {
+    if (tree.parent(i) != i - 1) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -63,15 +89,18 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       ties_(model.mimics, model.tree.shape.velocities),
       effects_(plan, model) {
   work_.allocate(model.tree.shape);
+  is_long_chain_ = !kEffects && one_pass_ && options.order == 2 && is_long_chain(model.tree);
+  shares_rows_ = !kEffects && one_pass_ && options.order == 2 && shares_rows(model.tree);
 }
 
-/// then(part) follows the forces of each part of the tree.
+/// first(part) comes before the placements of each part of the tree, then(part) after its forces.
 template <bool kEffects>
-template <class Then>
-void TreeSweeps<kEffects>::refresh_and(const Field<double>& q, const Then& then) {
+template <class First, class Then>
+void TreeSweeps<kEffects>::refresh_and(const Field<double>& q, const First& first, const Then& then) {
   down_and_up(
-      model_.tree,
+      model_.tree, Branches::last_first, shares_rows_,
       [&](Slots part) {
+        first(part);
         placement_map(model_.tree, *constants_, q, part, work_.placement);
         if (has_gravity_) gravity_field_down(model_.tree, work_.placement, gravity(), part, work_.field);
       },
@@ -88,14 +117,47 @@ void TreeSweeps<kEffects>::refresh_and(const Field<double>& q, const Then& then)
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::refresh(const Field<double>& q) {
-  refresh_and(q, [](Slots) {});
+  const auto nothing = [](Slots) {};
+  refresh_and(q, nothing, nothing);
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::arrive(const Field<double>& q, double h, Field<double>& p) {
-  refresh_and(q, [&](Slots part) {
-    momentum_update_map(model_.tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, p);
+double TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
+  const Tree& tree = model_.tree;
+  const auto advance = [&](Slots part) {
+    remember(work_.delta, velocities(tree, part), state.history);
+    advance_map(tree, work_.motion, work_.delta, part, state.q);
+  };
+  if (!ties_.empty()) {
+    advance(all_slots(tree));
+    for (const Mimic& mimic : mimics()) state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
+  }
+  if (!seen_) complete();
+  double work = 0;
+  refresh_and(
+      state.q,
+      [&](Slots part) {
+        if (ties_.empty()) advance(part);
+      },
+      [&](Slots part) {
+        if (seen_) {
+          momentum_end_map(tree, h, work_.increment, work_.force, part, state.p);
+        } else {
+          momentum_update_map(tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, state.p);
+        }
+        work += force_work(part);
+      });
+  return work;
+}
+
+template <bool kEffects>
+double TreeSweeps<kEffects>::force_work(Slots part) const {
+  const Slots rows = velocities(model_.tree, part);
+  double sum = 0;
+  for_bodies<double>(rows.begin, rows.end, [&](auto bodies, Index row) {
+    sum += summed(bodies, gather_row(bodies, work_.force, row) * gather_row(bodies, work_.delta, row));
   });
+  return sum;
 }
 
 template <bool kEffects>
@@ -111,8 +173,8 @@ void TreeSweeps<kEffects>::forces(Slots part) {
   const Tree& tree = model_.tree;
   if (has_gravity_) gravity_force_up(tree, *constants_, work_.placement, work_.field, part, work_.first_moment, work_.force);
   if (applied_.empty()) return;
-  const Index end = part.end < tree.shape.slots ? tree.first_v(part.end) : tree.shape.velocities;
-  for (Index row = tree.first_v(part.begin); row < end; ++row) {
+  const Slots rows = velocities(tree, part);
+  for (Index row = rows.begin; row < rows.end; ++row) {
     const double applied = applied_[static_cast<std::size_t>(row)];
     work_.force(row) = has_gravity_ ? work_.force(row) + applied : applied;
   }
@@ -125,14 +187,40 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool fresh,
   report.evaluations += 1;
   if (fresh) report.factorisations += 1;
   Evaluated now;
-  const auto down = [&](Slots part) {
+  const auto move = [&](Slots part) {
     motions(part);
     const double least = displacement_down(model_.tree, work_.placement, work_.motion, part, work_.displacement);
     now.least_w = std::min(now.least_w, least);
+  };
+  const auto momenta = [&](Slots part) {
     now.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
   };
+  const auto down = [&](Slots part) {
+    move(part);
+    momenta(part);
+  };
   if (!kEffects && one_pass_) {
-    down_and_up(model_.tree, down, [&](Slots part) { now.norm += pass_part(part, fresh, NothingAdded{}); });
+    complete_ = !shares_rows_;
+    seen_ = !fresh && (shares_rows_ || is_long_chain_);
+    const auto up = [&](Slots part) {
+      now.norm += pass_part(part, fresh, NothingAdded{});
+      if (seen_) {
+        momentum_seen_map(model_.tree, *constants_, work_.displacement, work_.impulse, work_.innovation, part, work_.increment);
+      }
+    };
+    if (is_long_chain_) {
+      // momenta on the way up, where a factor reads inertias and displacements too; of a part its parent's, to which it adds, and not its
+      // last, which it had from the part before
+      const Slots all = all_slots(model_.tree);
+      in_parts_down(all, move);
+      in_parts_up(all, [&](Slots part) {
+        momenta({std::max(all.begin, part.begin - 1), part.end == all.end ? part.end : part.end - 1});
+        up(part);
+      });
+    } else {
+      // a correction begins where the pass before it ended: what that left is still in the cache
+      down_and_up(model_.tree, fresh ? Branches::last_first : Branches::first_first, shares_rows_, down, up);
+    }
     now.scale = now.energy;
     return now;
   }
@@ -141,6 +229,17 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool fresh,
   act(now);
   pass_up(now, fresh);
   return now;
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::complete() {
+  if (complete_) return;
+  const Slots all = all_slots(model_.tree);
+  motion_map(model_.tree, *constants_, work_.delta, work_.motion);
+  displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
+  momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
+  innovation_up(model_.tree, *constants_, all, work_);
+  complete_ = true;
 }
 
 /// Effects on bodies and joints, for the displacements of an evaluation.
@@ -243,6 +342,8 @@ void TreeSweeps<kEffects>::pass_up(Evaluated& now, bool fresh) {
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::factor_again(Evaluated& now, StepReport& report) {
+  complete();
+  seen_ = false;
   report.factorisations += 1;
   if (!one_pass_) {
     factor();
@@ -283,6 +384,15 @@ Evaluated TreeSweeps<kEffects>::evaluate(StepReport& report) {
 }
 
 template <bool kEffects>
+Evaluated TreeSweeps<kEffects>::evaluate_from(const State<double>& state, const Extrapolation& guess, double h, StepReport& report) {
+  return evaluate_motions(report, true, [&](Slots part) {
+    momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target);
+    extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
+    motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
+  });
+}
+
+template <bool kEffects>
 Evaluated TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
   return evaluate_motions(report, false, [&](Slots part) {
     correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
@@ -298,6 +408,7 @@ Evaluated TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
     return correct(1, report);
   }
   return evaluate_motions(report, false, [&](Slots part) {
+    if (part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);  // another branch's are there
     increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, part, work_.variation,
                    work_.applied);
     correct_motion_map(model_.tree, *constants_, work_.applied, 1.0, part, work_.delta, work_.motion);
@@ -317,8 +428,9 @@ double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before)
 }
 
 template <bool kEffects>
-bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) const {
+bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) {
   if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
+  complete();
   const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
   const double unit = epsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;

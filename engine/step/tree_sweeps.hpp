@@ -18,6 +18,7 @@
 
 #include "engine/options.hpp"
 #include "engine/step/effect_sweeps.hpp"
+#include "engine/step/extrapolation.hpp"
 #include "engine/step_report.hpp"
 #include "kernels/articulated.hpp"
 #include "kernels/mimic.hpp"
@@ -50,8 +51,11 @@ class TreeSweeps {
 
   /// Placements, forces and potentials at q.
   void refresh(const Field<double>& q);
-  /// The same at the end of a step of h, and its momenta p.
-  void arrive(const Field<double>& q, double h, Field<double>& p);
+  /// The same at the end of a step of h, whose displacement joins the history: positions, momenta. Returns the work of the forces there
+  /// along the displacement [J].
+  double arrive(double h, State<double>& state);
+  /// Work of the forces of potentials and of those applied along delta, of some bodies [J].
+  double force_work(Slots part) const;
   /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
   double potential() const { return potential_; }
   double effect_potential() const { return effect_potential_; }
@@ -63,6 +67,10 @@ class TreeSweeps {
   void begin(bool known, double scale);
   /// With a fresh factor.
   Evaluated evaluate(StepReport& report);
+  /// The same from a guess of delta, momentum_target and all.
+  Evaluated evaluate_from(const State<double>& state, const Extrapolation& guess, double h, StepReport& report);
+  /// Motions, displacements and impulses of all bodies: where branches share rows an evaluation leaves those of the last it met.
+  void complete();
   /// A fresh factor for the evaluation made last.
   void factor_again(Evaluated& now, StepReport& report);
   /// The evaluation after a correction by what the factor makes of the residual.
@@ -78,7 +86,7 @@ class TreeSweeps {
   double slope_along(const Field<double>& innovation_before) const;
   /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
   /// beside the motion, or beside what gravity alone would do to it where all is at rest (fall).
-  bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) const;
+  bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons);
 
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
   void velocity_of(const Field<double>& p, Field<double>& v);
@@ -87,8 +95,8 @@ class TreeSweeps {
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
 
  private:
-  template <class Then>
-  void refresh_and(const Field<double>& q, const Then& then);
+  template <class First, class Then>
+  void refresh_and(const Field<double>& q, const First& first, const Then& then);
   template <class Motions>
   Evaluated evaluate_motions(StepReport& report, bool fresh, const Motions& motions);
   template <class Added>
@@ -113,6 +121,10 @@ class TreeSweeps {
   Options options_;
   bool has_gravity_;
   bool one_pass_;
+  bool shares_rows_ = false;  // branches do, see Slots
+  bool is_long_chain_ = false;
+  bool complete_ = true;      // see complete()
+  bool seen_ = false;         // increment holds the momenta of the evaluation made last, seen from the end of the step
   double potential_ = 0, effect_potential_ = 0;
   double effect_scale_ = 0;
   bool guess_points_ = false;  // no evaluation of this solve has been made yet

@@ -41,7 +41,7 @@ TEST_CASE("polynomials through the last displacements are continued exactly") {
 TEST_CASE("of histories that are noise a cubic near them is taken, which multiplies it by 5 and not by 16") {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0, 1e-3);
-  const auto smooth = [](Index i, int t) { return 1 + 0.1 * t + 0.02 * t * t + 1e-3 * t * t * t + 1e-4 * i; };
+  const auto smooth = [](Index i, int t) { return 1 + 0.1 * t + 0.02 * t * t + 1e-4 * t * t * t + 1e-4 * i; };
   const Field<double, kHistory> history = history_of([&](Index i, int t) { return smooth(i, t) + noise(random); });
   Field<double> delta;
   delta.allocate(kRows);

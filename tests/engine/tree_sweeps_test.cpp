@@ -22,9 +22,9 @@ struct End {
   std::vector<double> positions, velocities;
 };
 
-End after_steps(const Model& model, const Options& options, int steps) {
+End after_steps(const Model& model, const Options& options, int steps, double spread = 0.3) {
   Simulation simulation(model, options);
-  random_start(simulation, 3, 0.3);
+  random_start(simulation, 3, spread);
   run(simulation, steps);
   const auto copy = [](std::span<const double> numbers) { return std::vector<double>(numbers.begin(), numbers.end()); };
   return {copy(simulation.positions()), copy(simulation.velocities())};
@@ -38,6 +38,43 @@ TEST_CASE("steps branch by branch are those of whole sweeps, to rounding") {
     const End branches = after_steps(model, {.step = 1e-3}, 8), whole = after_steps(in_one_piece(model), {.step = 1e-3}, 8);
     CHECK(distance(branches.positions, whole.positions) < 1e-11);
     CHECK(distance(branches.velocities, whole.velocities) < 1e-8);
+  }
+}
+
+TEST_CASE("branches that share rows leave what a step needs that takes no correction, several, or fails") {
+  const Model model = balanced_tree(4000), piece = in_one_piece(model);
+  const auto same = [&](const Options& options, int steps, double spread) {
+    const End branches = after_steps(model, options, steps, spread), whole = after_steps(piece, options, steps, spread);
+    CHECK(distance(branches.positions, whole.positions) < 1e-10);
+    CHECK(distance(branches.velocities, whole.velocities) < 1e-7);
+  };
+  SECTION("no correction") {
+    const Options options{.step = 1e-4, .tolerance = 1e-4};
+    Simulation simulation(model, options);
+    random_start(simulation, 3, 0.1);
+    run(simulation, 10);
+    REQUIRE(simulation.step().evaluations == 1);
+    same(options, 12, 0.1);
+  }
+  SECTION("several, to the floor that rounding sets") {
+    const Options options{.step = 1e-3, .tolerance = 1e-18};
+    Simulation simulation(model, options);
+    random_start(simulation, 3, 0.3);
+    const StepReport report = simulation.step();
+    REQUIRE(report.ok());
+    REQUIRE(report.at_rounding_floor);
+    REQUIRE(report.evaluations > 2);
+    same(options, 5, 0.3);
+  }
+  SECTION("failure") {
+    Simulation branches(model, {.step = 1}), whole(piece, {.step = 1});
+    for (Simulation* simulation : {&branches, &whole}) random_start(*simulation, 3, 20);
+    const std::vector<double> before(branches.positions().begin(), branches.positions().end());
+    const StepReport report = branches.step(), other = whole.step();
+    REQUIRE_FALSE(report.ok());
+    CHECK(report.status == other.status);
+    CHECK(report.slot == other.slot);
+    CHECK(distance(branches.positions(), before) == 0);
   }
 }
 

@@ -65,6 +65,21 @@ TEST_CASE("the target is h (p + h/2 Q), and the update (S^T Ad_dT^T F - C r) / h
   CHECK(worst < 64 * kEpsilon);
 }
 
+TEST_CASE("the update in two halves is the update") {
+  for (const Model& model : mixed_trees()) {
+    Rig<double> rig(model);
+    rig.set(random_instance(reference::plain_tree(model), 5, 1.0));
+    update.prepare(rig);
+    update.run(rig);
+    const VectorXd at_once = vector(rig.state.p);
+    const Slots all = all_slots(rig.tree);
+    momentum_seen_map(rig.tree, rig.constants, rig.work.displacement, rig.work.impulse, rig.work.residual, all, rig.work.increment);
+    momentum_end_map(rig.tree, rig.h, rig.work.increment, rig.work.force, all, rig.state.p);
+    INFO(model.names.model);
+    CHECK(relative_error(vector(rig.state.p), at_once) < 1e-13);
+  }
+}
+
 TEST_CASE("the momentum at the end of a solved step is the derivative of the discrete action by its end") {
   double worst = 0;
   for (const Model& model : mixed_trees()) {
