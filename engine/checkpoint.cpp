@@ -1,9 +1,9 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
-//   "linden checkpoint 2\n"
+//   "linden checkpoint 3\n"
 //   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of effects' numbers (little endian, as laid out below)
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
-//   of every sub-step but the first: valid rows of its history, its history
+//   where a step has sub-steps, what their first guesses know (engine/step/stage_guess.hpp): counts, numbers
 //   what effects keep from step to step, 8 bytes a number
 //   FNV-1a over all of it
 //
@@ -23,7 +23,7 @@
 namespace linden {
 namespace {
 
-constexpr std::string_view kMagic = "linden checkpoint 2\n";
+constexpr std::string_view kMagic = "linden checkpoint 3\n";
 constexpr std::int64_t kMostSteps = std::int64_t{1} << 53;  // beyond it their count times the step has no double of its own
 
 struct Header {
@@ -72,10 +72,9 @@ void Simulation::save(const std::string& file) {
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
     append(bytes, field.flat().data(), field.flat().size());
   });
-  for (const Past& past : past_) {
-    const std::int64_t rows = past.rows;
-    append(bytes, &rows, 1);
-    append(bytes, past.history.flat().data(), past.history.flat().size());
+  if (stage_guess_) {
+    append(bytes, stage_guess_->known().data(), stage_guess_->known().size());
+    append(bytes, stage_guess_->numbers().data(), stage_guess_->numbers().size());
   }
   for (const std::span<double> numbers : stepper_->effect_memory()) append(bytes, numbers.data(), numbers.size());
   const std::uint64_t sum = checksum(bytes);
@@ -121,8 +120,8 @@ void Simulation::load(const std::string& file) {
   }
   std::size_t expected = body + sizeof(std::uint64_t);
   State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) { expected += field.bytes(); });
-  std::vector<Past> past = past_;
-  for (const Past& one : past) expected += sizeof(std::int64_t) + one.history.bytes();
+  std::optional<StageGuess> stage_guess = stage_guess_;
+  if (stage_guess) expected += stage_guess->known().size_bytes() + stage_guess->numbers().size_bytes();
   for (const std::span<double> numbers : memory) expected += numbers.size_bytes();
   std::uint64_t sum = 0;
   std::memcpy(&sum, bytes.data() + bytes.size() - sizeof(sum), sizeof(sum));
@@ -143,20 +142,21 @@ void Simulation::load(const std::string& file) {
     const bool finite = std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
     if (!finite) impossible("a number that is not finite");
   }
-  for (Past& one : past) {
-    std::int64_t rows = 0;
-    std::memcpy(&rows, next, sizeof(rows));
-    if (rows < 0 || rows > kHistory) impossible(fmt::format("the displacements of {} steps", rows));
-    one.rows = static_cast<int>(rows);
-    std::memcpy(one.history.flat().data(), next + sizeof(rows), one.history.bytes());
-    next += sizeof(rows) + one.history.bytes();
+  if (stage_guess) {
+    std::memcpy(stage_guess->known().data(), next, stage_guess->known().size_bytes());
+    next += stage_guess->known().size_bytes();
+    for (const std::int64_t rows : stage_guess->known()) {
+      if (rows < 0 || rows > StageGuess::kRows) impossible(fmt::format("the displacements of {} steps", rows));
+    }
+    std::memcpy(stage_guess->numbers().data(), next, stage_guess->numbers().size_bytes());
+    next += stage_guess->numbers().size_bytes();
   }
   for (const std::span<double> numbers : memory) {
     std::memcpy(numbers.data(), next, numbers.size_bytes());
     next += numbers.size_bytes();
   }
   state_ = loaded;
-  past_ = std::move(past);
+  stage_guess_ = std::move(stage_guess);
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);
   effect_work_ = {};

@@ -33,9 +33,8 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
-  past_.resize(composition(options.order).size() - 1);
-  for (Past& past : past_) past.history.allocate(model_->tree.shape.velocities);
-  if (!past_.empty()) {
+  if (const std::span<const double> stages = composition(options.order); stages.size() > 1) {
+    stage_guess_.emplace(stages, model_->tree.shape.velocities);
     good_q_ = state_.q;
     good_p_ = state_.p;
     good_pace_.allocate(2);
@@ -59,10 +58,7 @@ void Simulation::changed() {
   history_ = 0;
   stepper_->forget();
   std::ranges::fill(state_.history.flat(), 0.0);
-  for (Past& past : past_) {
-    past.rows = 0;
-    std::ranges::fill(past.history.flat(), 0.0);
-  }
+  if (stage_guess_) stage_guess_->forget();
   std::ranges::fill(state_.pace.flat(), std::numeric_limits<double>::quiet_NaN());
   stepper_->refresh(state_);
 }
@@ -139,7 +135,7 @@ void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, cons
 }
 
 StepReport Simulation::step() {
-  const StepReport report = past_.empty() ? stepper_->step(state_, history_, time(), options_.step) : step_in_stages();
+  const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step);
   if (report.ok()) {
     ++steps_;
     effect_work_.add(stepper_->effect_work());
@@ -147,7 +143,6 @@ StepReport Simulation::step() {
   return report;
 }
 
-/// The displacements of a sub-step change smoothly from step to step; from one sub-step to the next they do not, so each has its own past.
 StepReport Simulation::step_in_stages() {
   std::ranges::copy(state_.q.flat(), good_q_.flat().begin());
   std::ranges::copy(state_.p.flat(), good_p_.flat().begin());
@@ -155,11 +150,16 @@ StepReport Simulation::step_in_stages() {
   StepReport whole;
   const std::span<const double> stages = composition(options_.order);
   for (std::size_t i = 0; i < stages.size(); ++i) {
-    if (i > 0) std::swap(state_.history, past_[i - 1].history);
-    const StepReport report = stepper_->step(state_, i > 0 ? past_[i - 1].rows : history_, time(), stages[i] * options_.step);
-    if (i > 0) std::swap(state_.history, past_[i - 1].history);
+    const bool extrapolates = options_.guess == FirstGuess::extrapolation;
+    const bool known = extrapolates ? stage_guess_->predict(i, state_.history) : stage_guess_->repeat(i, state_.history);
+    history_ = known ? 1 : 0;
+    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step);
     whole.add(report);
-    if (report.ok()) continue;
+    if (report.ok()) {
+      // a sub-step that was split leaves no history
+      history_ > 0 ? stage_guess_->learn(i, state_.history) : stage_guess_->forget(i);
+      continue;
+    }
     // back to the beginning; sub-steps that were taken have lost part of their past, so all begin anew
     std::ranges::copy(good_q_.flat(), state_.q.flat().begin());
     std::ranges::copy(good_p_.flat(), state_.p.flat().begin());

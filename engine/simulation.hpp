@@ -12,10 +12,12 @@
 
 #include <iosfwd>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "engine/step/stage_guess.hpp"
 #include "engine/step/stepper.hpp"
 #include "layout/effects.hpp"
 
@@ -82,12 +84,6 @@ class Simulation {
   void load(const std::string& file);
 
  private:
-  /// What the first guess of a sub-step extrapolates from: displacements of the same sub-step of earlier steps, as in State.
-  struct Past {
-    Field<double, kHistory> history;
-    int rows = 0;  // valid
-  };
-
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
   StepReport step_in_stages();
@@ -101,7 +97,7 @@ class Simulation {
   EffectWork<double> effect_work_;
   std::int64_t steps_ = 0;
   int history_ = 0;
-  std::vector<Past> past_;    // of every sub-step but the first, whose past is the state's own
+  std::optional<StageGuess> stage_guess_;      // where a step has several sub-steps; none of them then looks at the state's history
   Field<double> good_q_, good_p_, good_pace_;  // at the beginning of a step of several sub-steps
 };
 
