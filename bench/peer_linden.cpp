@@ -31,12 +31,13 @@ class AlonePeer : public Peer {
     return {rows.begin(), rows.end()};
   }
   Energy energy(std::int64_t) override { return simulation_.energy(); }
+  std::optional<Momentum> momentum(std::int64_t) override { return simulation_.momentum(); }
 
  private:
   static Options options(const Plan& plan, int order) {
     Options options{.step = plan.step, .gravity = {0, 0, -plan.gravity}};
     options.order = order;
-    options.tolerance = default_tolerance(order);
+    use_default_tolerance(options);
     return options;
   }
 

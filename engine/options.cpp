@@ -46,6 +46,11 @@ Choice choice_in(std::span<const Named<Choice>> list, const char* what, const st
 
 double default_tolerance(int order) { return order > 4 ? 1e-13 : order > 2 ? 1e-12 : Options().tolerance; }
 
+void use_default_tolerance(Options& options) {
+  options.tolerance = default_tolerance(options.order);
+  options.reduction = options.order == 4 ? 1e-5 : 0;
+}
+
 std::string_view name(Solver solver) { return name_in<Solver>(kSolvers, solver); }
 std::string_view name(FirstGuess guess) { return name_in<FirstGuess>(kGuesses, guess); }
 std::string_view name(StopTest stop) { return name_in<StopTest>(kStops, stop); }
@@ -61,6 +66,9 @@ void check(const Options& options) {
   composition(options.order);
   if (!(options.tolerance > 0) || !std::isfinite(options.tolerance)) {
     throw InputError(fmt::format("the solver's tolerance is {}; it must be positive (default 1e-10)", options.tolerance));
+  }
+  if (!(options.reduction >= 0) || !(options.reduction < 1)) {
+    throw InputError(fmt::format("the solver's reduction is {}; it must be a share, zero for none", options.reduction));
   }
   for (const double g : options.gravity) {
     if (!std::isfinite(g)) throw InputError(fmt::format("gravity holds {}; it must be three finite numbers [m/s^2]", g));

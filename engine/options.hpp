@@ -36,6 +36,7 @@ struct Options {
   FirstGuess guess = FirstGuess::extrapolation;
   StopTest stop = StopTest::energy;
   double tolerance = 1e-10;
+  double reduction = 0;    // share of the first guess's residual at which a solve has converged as well; 0: none
   int max_iterations = 0;  // corrections in one solve; 0: 50 for newton, 1,000 for riqn
   int max_splits = 8;      // a step that fails is split in two this many times over: down to h / 256
 };
@@ -44,6 +45,11 @@ struct Options {
 /// price only where the solves are as exact as they: at 1e-10 the humanoid strays by 1e-8 in a second whatever the step, at 1e-13 by
 /// 5e-12, for a tenth more evaluations at most.
 double default_tolerance(int order);
+
+/// Sets tolerance and reduction to them. Reduction is 1e-5 for order 4: where the guess is far off the step barely resolves the motion, and
+/// an exact solve of it buys nothing. On the ten-link chain at 4 ms that is 13 % less time than the tolerance alone, at 1 ms 1 %, with the
+/// same energy over 1,000 s. Orders 6 and 8 leave less of the first guess's residual themselves, and have none.
+void use_default_tolerance(Options& options);
 
 std::string_view name(Solver solver);
 std::string_view name(FirstGuess guess);

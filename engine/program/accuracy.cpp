@@ -101,7 +101,7 @@ class Measurement {
   void fit_duration() {
     const double h = setup_.options.step;
     // sub-steps of the reference, and of all methods down to the step of the options, in units of the duration over that step
-    constexpr double reference = 17, rows = 2 * 37;
+    constexpr double reference = 17, rows = 2 * 39;
     const Motion pilot =
         run(kOrder2, h, setup_.options.tolerance, 0.02 * setup_.budget, 8, [](std::int64_t) { return false; });
     const double each = pilot.steps > 0 ? pilot.seconds / static_cast<double>(pilot.steps) : 0;
@@ -319,11 +319,16 @@ class Measurement {
     truth_ = std::move(ours.positions[static_cast<std::size_t>(judged_)]);
   }
 
+  /// 0 stands for the method's own.
+  static double shown(const AccuracyMethod& method, double tolerance) {
+    return tolerance == 0 && method.kind == Kind::composed ? default_tolerance(method.order) : tolerance;
+  }
+
   AccuracyRow row(const AccuracyMethod& method, double step, double tolerance) {
     AccuracyRow result;
     result.method = method;
     result.step = step;
-    result.tolerance = tolerance;
+    result.tolerance = shown(method, tolerance);
     const auto keep = [&](std::int64_t sample) { return sample == judged_; };
     const Motion motion = run(method, step, tolerance, setup_.budget, samples(), keep);
     result.left_out = motion.stopped;
@@ -355,7 +360,7 @@ class Measurement {
     } else {
       found.method = method;
       found.step = step;
-      found.tolerance = tolerance;
+      found.tolerance = shown(method, tolerance);
       found.left_out = true;
     }
     before = found.left_out ? setup_.budget : elapsed() - begin;
@@ -368,8 +373,7 @@ class Measurement {
     double step = every_;
     for (int k = 0; k < kLadder; ++k, step /= 2) {
       for (std::size_t m = 0; m < methods_.size(); ++m) {
-        const bool solves = methods_[m].kind == Kind::composed;
-        add(methods_[m], step, solves ? default_tolerance(methods_[m].order) : 0, before[m], true);
+        add(methods_[m], step, 0, before[m], true);
       }
     }
     std::ranges::stable_sort(figures_.rows, {},

@@ -103,7 +103,8 @@ struct AccuracyFigures {
 /// done.
 AccuracyFigures measure_accuracy(const AccuracySetup& setup, const std::function<bool(double seconds)>& go_on);
 
-/// One run without a reference: energy, momentum, time. Energies relative to `kinetic` [J]; the error is NaN.
+/// One run without a reference: energy, momentum, time. tolerance: 0 for the method's own. Energies relative to `kinetic` [J]; the error is
+/// NaN.
 AccuracyRow measure_energy(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance,
                            double kinetic);
 

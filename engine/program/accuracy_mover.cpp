@@ -101,7 +101,12 @@ std::unique_ptr<Mover> mover_of(const AccuracySetup& setup, const AccuracyMethod
   Options options = setup.options;
   options.step = step;
   options.order = method.kind == Kind::composed ? method.order : 2;
-  if (tolerance > 0) options.tolerance = tolerance;
+  if (tolerance > 0) {
+    options.tolerance = tolerance;
+    options.reduction = 0;
+  } else {
+    use_default_tolerance(options);
+  }
   switch (method.kind) {
     case Kind::rk4: return std::make_unique<BaselineMover>(setup, Scheme::rk4, options);
     case Kind::semi_implicit_euler: return std::make_unique<BaselineMover>(setup, Scheme::semi_implicit_euler, options);

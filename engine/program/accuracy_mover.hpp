@@ -29,7 +29,7 @@ class Mover {
   virtual std::string failure() const = 0;
 };
 
-/// tolerance: 0 for the method's own.
+/// tolerance: 0 for the method's own (use_default_tolerance).
 std::unique_ptr<Mover> mover_of(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance);
 
 }  // namespace linden

@@ -63,7 +63,10 @@ void read_motion_options(const Texts& texts, MotionArguments& motion, Options& o
   read_model_options(texts, motion.base, options);
   if (!texts.duration.empty()) motion.duration = number_from("--duration", texts.duration, "seconds, such as 10");
   if (!texts.dt.empty()) options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
-  if (!texts.tolerance.empty()) options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
+  if (!texts.tolerance.empty()) {
+    options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
+    options.reduction = 0;
+  }
   if (!texts.seed.empty()) {
     const std::int64_t seed = integer_from("--seed", texts.seed, "a whole number, zero or more");
     if (seed < 0) throw InputError(fmt::format("--seed {}: expected a whole number, zero or more", seed));
@@ -105,7 +108,7 @@ void read_run_options(const Texts& texts, RunArguments& run) {
     // a tolerance that nobody chose goes with the order
     const bool chosen = !texts.tolerance.empty() || run.options.tolerance != default_tolerance(run.options.order);
     run.options.order = static_cast<int>(order);
-    if (!chosen) run.options.tolerance = default_tolerance(run.options.order);
+    if (!chosen) use_default_tolerance(run.options);
   }
 }
 

@@ -33,6 +33,11 @@ std::string order_text(const Options& options) {
   return fmt::format("order {} ({} sub-steps), ", options.order, composition(options.order).size());
 }
 
+/// " or 1e-05 of the first residual"; where there is none, nothing.
+std::string reduction_text(const Options& options) {
+  return options.reduction > 0 ? fmt::format(" or {:g} of the first residual", options.reduction) : "";
+}
+
 std::string plural(std::int64_t number, const char* one, const char* more) { return number == 1 ? one : more; }
 
 }  // namespace
@@ -61,8 +66,9 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) {
     row("ignored", left_out + "; a scene can name them");
   }
-  row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}), first guess {}, {}", name(options.solver), order_text(options),
-                            options.step, options.tolerance, name(options.stop), name(options.guess), gravity_text(options)));
+  row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}){}, first guess {}, {}", name(options.solver), order_text(options),
+                            options.step, options.tolerance, name(options.stop), reduction_text(options), name(options.guess),
+                            gravity_text(options)));
   if (figures.steps == 0) return text;
 
   const double simulated = figures.simulated(options.step);
@@ -147,6 +153,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"guess", name(options.guess)},
       {"stop", name(options.stop)},
       {"tolerance", options.tolerance},
+      {"reduction", options.reduction},
       {"order", options.order},
       {"step", options.step},
       {"gravity", options.gravity},

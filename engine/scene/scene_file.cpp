@@ -199,7 +199,7 @@ class SceneReader {
         if (options.order % 2 != 0) value.refuse("2, 4, 6 or 8", "odd orders do not exist");
       }
     }
-    if (!tolerance) options.tolerance = default_tolerance(options.order);
+    if (!tolerance) use_default_tolerance(options);
     if (scene_.duration < options.step) {
       root_.fail(fmt::format("a duration of {} s is less than a step of {} s", scene_.duration, options.step), "one step or more",
                  "change one of them");

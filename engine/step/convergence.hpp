@@ -25,6 +25,9 @@ inline constexpr double kSettled = 1e-4, kSettledSquared = kSettled * kSettled;
 /// Share of its kinetic energy that a scene with effects may have back a step after an impact took it.
 inline constexpr double kImpactMemory = 0.9;
 
+/// A first guess that leaves a larger relative residual than this promises nothing of how exact its step is to be.
+inline constexpr double kRoughGuess = 1e-2;
+
 /// A step may gain this share of the kinetic energy beyond the work of the forces: what second order leaves where a motion is barely
 /// resolved. On ten-link chains whipping at 4 to 6 ms steps gain 0.02 to 0.12 at most; second roots, met from 8 ms on, 0.77 and more.
 inline constexpr double kMostGain = 0.25;

@@ -98,7 +98,7 @@ bool TreeStepper<kEffects>::halves(State<double>& state, int& history, double h,
 template <bool kEffects>
 bool TreeStepper<kEffects>::converged(const Evaluated& now, double norm, double h) const {
   if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * std::abs(h);
-  return 0.5 * norm <= options_.tolerance * options_.tolerance * now.scale;
+  return 0.5 * norm <= options_.tolerance * options_.tolerance * now.scale || norm <= enough_;
 }
 
 /// h^2 x kinetic energy that gravity gives in a step to what is at rest.
@@ -270,6 +270,7 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
     now = sweeps_.evaluate(report);
   }
   double norm = now.norm;
+  enough_ = options_.reduction * options_.reduction * std::min(norm, 2 * kRoughGuess * kRoughGuess * now.scale);
   bool fresh = true;  // the factor belongs to the current displacement
   StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
 

@@ -64,6 +64,7 @@ class TreeStepper final : public Stepper {
   TreeSweeps<kEffects> sweeps_;
   Workspace<double>& work_;
   EffectsIf<kEffects, double>& effects_;
+  double enough_ = 0;           // squared energy norm of a residual that will do, beside the tolerance
   double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
   double kinetic_ = 0;          // the same in J
   double force_work_ = 0;       // of the forces at the beginning along its displacement [J]
