@@ -17,6 +17,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,8 @@ class Peer {
 
   virtual std::vector<double> positions(std::int64_t i) = 0;
   virtual Energy energy(std::int64_t i) = 0;
+  /// Of all bodies, about the world's origin, as the engine's own velocities and inertias have it; nothing where it is not asked for.
+  virtual std::optional<Momentum> momentum(std::int64_t) { return std::nullopt; }
 };
 
 /// One engine with one integrator.

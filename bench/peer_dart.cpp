@@ -166,6 +166,17 @@ class DartPeer : public Peer {
     return {.kinetic = skeleton->computeKineticEnergy(), .potential = potential};
   }
 
+  std::optional<Momentum> momentum(std::int64_t i) override {
+    Vector3d angular = Vector3d::Zero(), linear = Vector3d::Zero();
+    for (const BodyNode* body : skeleton_at(i)->getBodyNodes()) {
+      const Vector6d own = body->getSpatialInertia() * body->getSpatialVelocity();  // angular, linear, in the body's frame
+      const Vector3d carried = body->getTransform().linear() * own.tail<3>();
+      linear += carried;
+      angular += body->getTransform().linear() * own.head<3>() + body->getTransform().translation().cross(carried);
+    }
+    return Momentum{{angular.x(), angular.y(), angular.z()}, {linear.x(), linear.y(), linear.z()}};
+  }
+
  private:
   SkeletonPtr skeleton_at(std::int64_t i) const { return worlds_[static_cast<std::size_t>(i)]->getSkeleton(0); }
   /// Bodies were added slot by slot.

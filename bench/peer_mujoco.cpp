@@ -170,6 +170,17 @@ class MujocoPeer : public Peer {
     return {.kinetic = data->energy[1], .potential = data->energy[0]};
   }
 
+  std::optional<Momentum> momentum(std::int64_t i) override {
+    mjData* data = data_[static_cast<std::size_t>(i)].get();
+    mj_forward(model_.get(), data);
+    mj_subtreeVel(model_.get(), data);  // of the world's subtree: the velocity of its centre of mass, what turns about that
+    Momentum all;
+    mju_scl3(all.linear.data(), data->subtree_linvel, mass());
+    mju_cross(all.angular.data(), data->subtree_com, all.linear.data());
+    mju_addTo3(all.angular.data(), data->subtree_angmom);
+    return all;
+  }
+
  private:
   /// First rows of one joint, ours and theirs.
   struct Place {
