@@ -300,6 +300,9 @@ TEST_CASE("a run of higher order says so, and its solves are as exact as it is",
   CHECK(json["order"] == 8);
   CHECK(json["energy_band"].get<double>() < 1e-8 * json["energy_scale"].get<double>());
   CHECK_THAT(shell.linden("run chain:5 --order 8 --tolerance 1e-11 --duration 0.1").out, Contains("tolerance 1e-11"));
+  CHECK_THAT(shell.linden("run chain:5 --order 4 --duration 0.1").out,
+             Contains("order 4 (5 sub-steps)") && Contains("tolerance 1e-12 (energy) or 1e-05 of the first residual"));
+  CHECK_THAT(shell.linden("run chain:5 --order 4 --tolerance 1e-12 --duration 0.1").out, !Contains("of the first residual"));
 }
 
 TEST_CASE("options that make no sense are refused before anything is computed", "[command line]") {

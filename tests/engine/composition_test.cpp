@@ -1,4 +1,6 @@
 // Orders 4, 6 and 8: their coefficients, what they keep of the one-step map, and what they refuse.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -234,6 +236,26 @@ TEST_CASE("every sub-step has a past of its own to start from: two evaluations o
   }
 }
 
+TEST_CASE("with a reduction, solves that begin far off end before the tolerance and energy is kept as well") {
+  const auto run_of = [](double reduction, double& band) {
+    Simulation simulation(chain(10), {.step = 4e-3, .order = 4, .tolerance = 1e-12, .reduction = reduction});
+    const double start = simulation.energy().total();
+    std::int64_t evaluations = 0;
+    for (int k = 0; k < 1000; ++k) {
+      evaluations += simulation.step().evaluations;
+      band = std::max(band, std::abs(simulation.energy().total() - start) / kTenLinkFall);
+    }
+    return evaluations;
+  };
+  double exact = 0, reduced = 0;
+  CHECK(static_cast<double>(run_of(1e-5, reduced)) < 0.85 * static_cast<double>(run_of(0, exact)));
+  CHECK(exact < 1e-3);
+  CHECK(reduced < 1e-3);
+  for (const double share : {-1e-5, 1.0, std::nan("")}) {
+    CHECK_THROWS_WITH(Simulation(chain(2), {.reduction = share}), Catch::Contains("the solver's reduction"));
+  }
+}
+
 TEST_CASE("what starts from rest, or is pushed by forces alone, is not taken for a false root") {
   for (const int order : kHigher) {
     CAPTURE(order);
@@ -355,6 +377,9 @@ TEST_CASE("a scene may name its order, and a tolerance that it does not name goe
   CHECK(options("order: 4\n").tolerance == 1e-12);
   CHECK(options("order: 8\n").tolerance == 1e-13);
   CHECK(options("tolerance: 1e-9\norder: 8\n").tolerance == 1e-9);
+  CHECK(options("order: 4\n").reduction == 1e-5);
+  CHECK(options("order: 4\ntolerance: 1e-12\n").reduction == 0);
+  for (const int order : {2, 6, 8}) CHECK(options(fmt::format("order: {}\n", order)).reduction == 0);
 }
 
 TEST_CASE("a batch knows order 2 only and says so") {
