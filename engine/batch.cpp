@@ -31,6 +31,7 @@ void check_batch(std::int64_t size, const BatchOptions& options) {
     throw InputError(fmt::format("a batch has no {} \"{}\"; it knows \"{}\" (a Simulation has them all)", what, found, only));
   };
   if (options.order != 2) refuse("order", fmt::format("{}", options.order), "2");
+  if (options.reduction != 0) refuse("reduction", fmt::format("{:g}", options.reduction), "0");
   if (options.solver != Solver::newton) refuse("solver", name(options.solver), name(Solver::newton));
   if (options.guess != FirstGuess::extrapolation) refuse("first guess", name(options.guess), name(FirstGuess::extrapolation));
   if (options.stop != StopTest::energy) refuse("stop test", name(options.stop), name(StopTest::energy));

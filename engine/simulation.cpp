@@ -149,15 +149,18 @@ StepReport Simulation::step_in_stages() {
   std::ranges::copy(state_.pace.flat(), good_pace_.flat().begin());
   StepReport whole;
   const std::span<const double> stages = composition(options_.order);
+  const bool extrapolates = options_.guess == FirstGuess::extrapolation;
   for (std::size_t i = 0; i < stages.size(); ++i) {
-    const bool extrapolates = options_.guess == FirstGuess::extrapolation;
     const bool known = extrapolates ? stage_guess_->predict(i, state_.history) : stage_guess_->repeat(i, state_.history);
     history_ = known ? 1 : 0;
     const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step);
     whole.add(report);
     if (report.ok()) {
-      // a sub-step that was split leaves no history
-      history_ > 0 ? stage_guess_->learn(i, state_.history) : stage_guess_->forget(i);
+      if (history_ > 0) {
+        stage_guess_->learn(i, state_.history);
+      } else {
+        stage_guess_->forget(i);  // it was split
+      }
       continue;
     }
     // back to the beginning; sub-steps that were taken have lost part of their past, so all begin anew

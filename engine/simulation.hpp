@@ -97,7 +97,7 @@ class Simulation {
   EffectWork<double> effect_work_;
   std::int64_t steps_ = 0;
   int history_ = 0;
-  std::optional<StageGuess> stage_guess_;      // where a step has several sub-steps; none of them then looks at the state's history
+  std::optional<StageGuess> stage_guess_;  // where a step has several sub-steps; none of them then looks at the state's history
   Field<double> good_q_, good_p_, good_pace_;  // at the beginning of a step of several sub-steps
 };
 

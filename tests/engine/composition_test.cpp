@@ -386,6 +386,9 @@ TEST_CASE("a batch knows order 2 only and says so") {
   BatchOptions options;
   options.order = 4;
   CHECK_THROWS_WITH(Batch(chain(3), 4, options), Catch::Contains("a batch has no order \"4\""));
+  options.order = 2;
+  options.reduction = 1e-5;
+  CHECK_THROWS_WITH(Batch(chain(3), 4, options), Catch::Contains("a batch has no reduction"));
 }
 
 }  // namespace
