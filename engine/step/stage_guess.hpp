@@ -28,7 +28,7 @@ namespace linden {
 
 class StageGuess {
  public:
-  /// stages: gamma_1, ..., gamma_s (engine/composition.hpp), which must outlive it.
+  /// stages: gamma_1, ..., gamma_s (engine/step/composition.hpp), which must outlive it.
   StageGuess(std::span<const double> stages, Index velocities);
 
   /// Writes the guess for a sub-step to the latest row of `history`, where the stepper takes it for the displacement of the step before.

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "engine/composition.hpp"
+#include "engine/step/composition.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {
