@@ -3,21 +3,25 @@
 //
 //   build/release/bench/bench_accuracy FOLDER [SECONDS]
 //
-// writes FOLDER/results/accuracy*-MACHINE.csv and FOLDER/figures/accuracy-*.svg, in some ten minutes at 20 s of budget a scene.
+// writes FOLDER/results/accuracy*-MACHINE.csv and FOLDER/figures/accuracy-*.svg, in some fifteen minutes at 20 s of budget a scene.
 //
 //   closed forms  error over h of every order and of RK4: pendulum, free body, Lagrange's top (tests/reference/closed_forms.hpp)
 //   scenes        what `linden accuracy` measures, over 10 s: pendulum, heavy top, free body, ten-link chain, tumbling humanoid
 //   long          energy and momentum over 1, 10 and 1,000 s, over CPU time per simulated second: ten-link chain, tumbling
 //                 humanoid
+//   equal bands   CPU time over RK4's at the same energy band: ten-link chain over 10 s, geometric means of bands over eight starts that
+//                 differ by 0.01 rad at most, since one chaotic path has bands by luck
 //   tolerance     what a looser solver does to energy and momentum over 50 s, and what it saves
 //
 // All times of a table are from one run of this program on one thread, so that they can be compared with each other.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <iostream>
+#include <random>
 #include <stdexcept>
 
 #include "engine/program/accuracy_report.hpp"
@@ -282,6 +286,69 @@ void long_runs(const Files& files) {
   files.table("accuracy-long", csv);
 }
 
+// equal bands
+
+/// CPU time per simulated second at an energy band, between the runs on both sides of it along straight lines of their logarithms. NaN
+/// outside.
+double seconds_at(double band, std::vector<std::array<double, 2>> runs) {
+  std::ranges::sort(runs);
+  for (std::size_t k = 1; k < runs.size(); ++k) {
+    const auto [band0, seconds0] = runs[k - 1];
+    const auto [band1, seconds1] = runs[k];
+    if (band < band0 || band > band1) continue;
+    return seconds0 * std::pow(seconds1 / seconds0, std::log(band / band0) / std::log(band1 / band0));
+  }
+  return std::nan("");
+}
+
+void equal_bands(const Files& files) {
+  constexpr int starts = 8;
+  constexpr double duration = 10, swing = 0.01;  // [s], [rad]
+  const Study links = ten_links();
+  const double scale = kinetic_scale(links);
+  const Ladder ladders[] = {{kOrders[0], {8, 16. / 3, 4, 8. / 3, 2, 4. / 3, 1, 2. / 3, 0.5}},
+                            {kOrders[1], {8, 16. / 3, 4, 3.2, 8. / 3, 2, 4. / 3, 1, 2. / 3, 0.5}},
+                            {kOrders[2], {8, 16. / 3, 4, 8. / 3, 2, 4. / 3, 1}},
+                            {kOrders[3], {8, 16. / 3, 4, 8. / 3, 2, 4. / 3}},
+                            {kRk4, {8, 16. / 3, 4, 8. / 3, 2, 4. / 3, 1, 2. / 3, 0.5, 1. / 3, 0.25, 1. / 6}}};  // [ms]
+  std::string csv = "scene,duration_s,starts,method,step_s,energy_band,least_band,largest_band,cpu_s_per_s,failed\n";
+  std::vector<std::vector<std::array<double, 2>>> runs;
+  for (const Ladder& ladder : ladders) {
+    runs.emplace_back();
+    for (const double step : ladder.steps) {
+      double sum = 0, seconds = 0, least = INFINITY, largest = 0;
+      int failed = 0;
+      std::mt19937 random(1);
+      for (int k = 0; k < starts; ++k) {
+        Study study = links;
+        study.scene.initial = {study.scene.model.neutral(), std::vector<double>(10, 0.0)};
+        std::uniform_real_distribution<double> off(-swing, swing);
+        for (double& angle : study.scene.initial.positions) angle += k > 0 ? off(random) : 0;
+        const AccuracyRow row = measure_energy(setup_of(study, duration, 1e4), ladder.method, 1e-3 * step, 0, scale);
+        failed += row.done() ? 0 : 1;
+        sum += std::log(row.band);
+        least = std::min(least, row.band);
+        largest = std::max(largest, row.band);
+        seconds += row.seconds / (starts * duration);
+      }
+      const double band = std::exp(sum / starts);
+      if (failed == 0) runs.back().push_back({band, seconds});
+      csv += fmt::format("{},{:g},{},{},{:.4g},{:.2e},{:.2e},{:.2e},{:.4g},{}\n", links.file, duration, starts, name(ladder.method),
+                         1e-3 * step, band, least, largest, seconds, failed);
+    }
+  }
+  files.table("accuracy-starts", csv);
+
+  std::string shares = "scene,duration_s,energy_band,rk4_cpu_s_per_s,order 2,order 4,order 6,order 8\n";
+  for (const double band : {1e-2, 3e-3, 1e-3, 6e-4, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8}) {
+    const double rk4 = seconds_at(band, runs.back());
+    shares += fmt::format("{},{:g},{:g},{:.4g}", links.file, duration, band, rk4);
+    for (std::size_t k = 0; k + 1 < runs.size(); ++k) shares += fmt::format(",{:.2f}", seconds_at(band, runs[k]) / rk4);
+    shares += "\n";
+  }
+  files.table("accuracy-equal-bands", shares);
+}
+
 // tolerance
 
 void tolerances(const Files& files) {
@@ -330,6 +397,7 @@ int main(int argc, char** argv) {
     closed_forms(files);
     scenes(files, argc > 2 ? std::stod(argv[2]) : 20);
     long_runs(files);
+    equal_bands(files);
     tolerances(files);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
