@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -49,9 +50,7 @@ struct Stage {
 std::vector<Contender> contenders() {
   std::vector<Contender> all;
   for (const int order : {2, 4, 6}) all.push_back(linden_of_order(order));
-  for (const Contender& one : installed_peers()) {
-    if (one.alone) all.push_back(one);
-  }
+  std::ranges::move(installed_peers(), std::back_inserter(all));
   return all;
 }
 
