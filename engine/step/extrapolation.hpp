@@ -6,8 +6,8 @@
 // The polynomial through five displacements multiplies what rounding left in them by 16, and the correction of so much noise is itself
 // rounded: on a chain of 100,000 links a step took a third evaluation of the residual for it. The cubic nearest to the five multiplies
 // noise by 5 and errs by 1.8 of their fourth difference. It is taken where that is larger than the third, as of noise alone it is (1.9
-// times; of a motion that its steps resolve it is smaller by far): evaluations a step at 50,000 links 2.00 instead of 2.13, at 100,000
-// 2.00 instead of 2.98; up to 20,000 nothing changes.
+// times; of a motion that its steps resolve it is smaller by far): evaluations a step at 50,000 links 2.00 instead of 2.12, at 100,000
+// 2.04 instead of 2.99; up to 20,000 nothing changes.
 #pragma once
 
 #include <array>

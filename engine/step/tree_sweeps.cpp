@@ -62,7 +62,8 @@ void down_and_up(const Tree& tree, Branches order, bool share, const Down& down,
 }
 
 /// Whether branches are to share rows. Motions of screws follow from delta; others are corrected from one evaluation to the next and need
-/// rows of their own. A step of a binary tree of 65,535 has 7 lines of memory a body to wait for so, and 16 with a row for every body.
+/// rows of their own. A step of a binary tree of 65,535 takes 18 lines of memory a body from beyond the second cache so, 27 with a row for
+/// every body, and 98 ns a body instead of 113.
 bool shares_rows(const Tree& tree) {
   return !tree.branches.empty() && tree.trunk.end + kBranch <= tree.shape.slots / 2 && tree.runs.size() == 1 &&
          tree.runs.front().kind == JointKind::screw;
