@@ -105,10 +105,11 @@ class LaneEffects {
     for (Index k = 0; k < alone_contacts_.rows(); ++k) L::set_lane(alone_contacts_(k), l, alone.contact(k));
   }
 
-  /// The end of a step: impulses on bodies now, those of joints by add_end once the momenta are there.
-  void end(const Mask& moves, Workspace<Pack>& work) {
-    if (sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, work.innovation, end_);
-    if (sweeps_.plan().bodies) sweeps_.end_bodies(work.placement, work.displacement, work.impulse);
+  /// The end of a step, of the lanes that took it together: impulses on bodies now, those of joints by add_end once the momenta are there.
+  void end(Lanes done, Workspace<Pack>& work) {
+    const Mask moves = L::mask(done);
+    if (done != 0 && sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, work.innovation, end_);
+    if (done != 0 && sweeps_.plan().bodies) sweeps_.end_bodies(work.placement, work.displacement, work.impulse);
     for (Index k = 0; k < sweeps_.contacts(); ++k) {
       sweeps_.set_contact(k, select(moves, sweeps_.contact(k), alone_contacts_(k)));
       alone_contacts_(k) = Pack(Real(0));

@@ -345,7 +345,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     const Pack work_at_begin = work();
     using std::max;
     Pack activity = number(0);
-    if constexpr (kEffects) activity = effects_.activity(work_);
+    if constexpr (kEffects) {
+      if (done != 0) activity = effects_.activity(work_);
+    }
     const Lanes gains =
         L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) - activity > number(kMostGain) * max(kinetic, pace));
     lost |= done & gains;
@@ -357,7 +359,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
 
     const Mask moves = L::mask(done);
-    if constexpr (kEffects) effects_.end(moves, work_);
+    if constexpr (kEffects) effects_.end(done, work_);
     advance(moves);
     update_momentum(moves);
     if constexpr (kEffects) {
