@@ -9,7 +9,7 @@
 //
 //   energy_band   largest less smallest total energy, over the largest kinetic energy that linden's order 6 meets in that time
 //   *_drift       of momentum, where nothing outside gives any: the largest change, over the most that the kinetic energy allows
-//                 (engine/drift.hpp), angular about the world's origin
+//                 (engine/drift.hpp), angular about the world's origin, from which what floats goes away
 //   cpu           of the steps alone, for a simulated second
 //
 // Before anything is measured an engine must have the same energy and momentum as linden at the start, to its rounding, and be within 1e-4 of linden
