@@ -104,9 +104,9 @@ class Measurement {
     constexpr double reference = 17, rows = 2 * 39;
     const Motion pilot =
         run(kOrder2, h, setup_.options.tolerance, 0.02 * setup_.budget, 8, [](std::int64_t) { return false; });
-    const double each = pilot.steps > 0 ? pilot.seconds / static_cast<double>(pilot.steps) : 0;
-    double duration = setup_.duration;
-    if (each > 0) duration = std::min(duration, 0.7 * setup_.budget * h / (each * (reference + rows)));
+    // where not one step was taken in the time for it, the least there is
+    const double fits = pilot.steps > 0 ? 0.7 * setup_.budget * h * static_cast<double>(pilot.steps) / (pilot.seconds * (reference + rows)) : 0;
+    const double duration = std::min(setup_.duration, fits);
     figures_.duration = every_ * std::max(1.0, std::floor(duration / every_ * (1 + 1e-9)));
   }
 
