@@ -36,6 +36,7 @@
 #include "kernels/residual_up.hpp"
 #include "layout/state.hpp"
 #include "layout/urdf.hpp"
+#include "layout/workspace.hpp"
 #include "models/generators.hpp"
 #include "tests/reference/closed_forms.hpp"
 

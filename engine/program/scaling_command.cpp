@@ -22,6 +22,7 @@
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
+#include "layout/workspace.hpp"
 #include "models/generators.hpp"
 
 namespace linden {

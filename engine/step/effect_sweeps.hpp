@@ -16,6 +16,8 @@
 #include <type_traits>
 
 #include "engine/step/effect_plan.hpp"
+#include "engine/step/effect_work.hpp"
+#include "kernels/articulated.hpp"
 #include "kernels/effects/armature.hpp"
 #include "kernels/effects/ball_spring.hpp"
 #include "kernels/effects/damping.hpp"
@@ -32,40 +34,6 @@
 #include "layout/workspace.hpp"
 
 namespace linden {
-
-/// What effects gave (driving ones) or took (losses) [J].
-#define LINDEN_EFFECT_WORK(FIELD)     \
-  FIELD(damping, "taken")             \
-  FIELD(friction, "taken")            \
-  FIELD(limits, "taken")              \
-  FIELD(servo, "given")               \
-  FIELD(torque, "given")              \
-  FIELD(wrench, "given")              \
-  FIELD(drag, "taken")                \
-  FIELD(ground, "taken")
-
-template <class S>
-struct EffectWork {
-#define LINDEN_MEMBER(name, sense) S name = S(0.0);
-  LINDEN_EFFECT_WORK(LINDEN_MEMBER)
-#undef LINDEN_MEMBER
-
-  void add(const EffectWork& more) {
-#define LINDEN_ADD(name, sense) name = name + more.name;
-    LINDEN_EFFECT_WORK(LINDEN_ADD)
-#undef LINDEN_ADD
-  }
-  S magnitude() const {
-    using std::abs;
-    S sum(0.0);
-#define LINDEN_MAGNITUDE(name, sense) sum = sum + abs(name);
-    LINDEN_EFFECT_WORK(LINDEN_MAGNITUDE)
-#undef LINDEN_MAGNITUDE
-    return sum;
-  }
-  S given() const { return servo + torque + wrench; }
-  S taken() const { return damping + friction + limits + drag + ground; }
-};
 
 /// f of each number of a Scalar.
 template <class S, class Function>
@@ -130,8 +98,21 @@ class EffectSweeps {
   /// What joints are given, and bodies, for the factors.
   const JointImpulses<S>& joint_sum() const { return sum_; }
   const BodyImpulses<S>& body_sum() const { return bodies_; }
-  /// Armature of every row; no rows without.
-  const Field<S>& rotors() const { return rotors_; }
+  /// action(added): what a factor has added to it, whatever acts.
+  template <class Action>
+  void with_added(const Action& action) const {
+    const Field<S>& stiffness = sum_.stiffness;
+    const Field<S, 36>& pull = bodies_.pull;
+    if (plan_.joints && plan_.bodies) return action(EffectsAdded<S, true, true>{stiffness, pull});
+    if (plan_.joints) return action(EffectsAdded<S, true, false>{stiffness, pull});
+    action(EffectsAdded<S, false, true>{stiffness, pull});
+  }
+  /// The same for the mass matrix, of which armature is the only part that is an effect.
+  template <class Action>
+  void with_rotors(const Action& action) const {
+    if (rotors_.rows() == 0) return action(NothingAdded{});
+    action(EffectsAdded<S, true, false>{rotors_, bodies_.pull});
+  }
   Index contacts() const { return points_.slides.rows(); }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
@@ -406,7 +387,7 @@ class EffectSweeps {
   double creep_ = 0;
   Field<S> last_, even_;  // of joints, as BodyImpulses has them of bodies
   const Field<S>* q_ = nullptr;
-  Field<S> rotors_;
+  Field<S> rotors_;  // armature of every row; no rows without
   JointImpulses<S> sum_;
   Servos<S> servos_;
   Frictions<S> frictions_;
@@ -419,9 +400,17 @@ class EffectSweeps {
   S ground_potential_ = S(0.0), ground_before_ = S(0.0);
 };
 
-/// Where a scene has none: no memory and nothing to call.
+/// Where a scene has none: no memory, and nothing is added to any factor.
 struct NoEffects {
   NoEffects(const EffectPlan&, const Model&) {}
+  template <class Action>
+  void with_added(const Action& action) const {
+    action(NothingAdded{});
+  }
+  template <class Action>
+  void with_rotors(const Action& action) const {
+    action(NothingAdded{});
+  }
 };
 template <bool kEffects, class S>
 using EffectsIf = std::conditional_t<kEffects, EffectSweeps<S>, NoEffects>;

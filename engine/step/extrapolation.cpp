@@ -8,7 +8,6 @@
 namespace linden {
 namespace {
 
-/// Next value of the polynomial through the last 1, ..., 5 values, latest first.
 constexpr std::array<std::array<double, kHistory>, kHistory> kThrough{{
     {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}, {5, -10, 10, -5, 1},
 }};
@@ -40,9 +39,11 @@ bool is_noise(const Field<double, kHistory>& history) {
 
 }  // namespace
 
+const std::array<double, kHistory>& polynomial_through(int terms) { return kThrough[static_cast<std::size_t>(terms - 1)]; }
+
 Extrapolation extrapolation(const Field<double, kHistory>& history, int terms) {
   const bool cubic = terms == kHistory && history.rows() >= kFewest && is_noise(history);
-  return {cubic ? kCubic : kThrough[static_cast<std::size_t>(terms - 1)], terms};
+  return {cubic ? kCubic : polynomial_through(terms), terms};
 }
 
 void extrapolate(const Extrapolation& guess, const Field<double, kHistory>& history, Slots rows, Field<double>& delta) {

@@ -17,6 +17,10 @@
 
 namespace linden {
 
+/// Next value of the polynomial through the last `terms` (1, ..., kHistory) values, latest first, is their sum with these factors; those
+/// beyond are zero.
+const std::array<double, kHistory>& polynomial_through(int terms);
+
 struct Extrapolation {
   std::array<double, kHistory> shares;  // of the last displacements, latest first
   int terms;                            // how many of them count

@@ -49,13 +49,6 @@ class LaneEffects {
   /// Returns the potential energy of springs and ground.
   Pack refresh(const Field<Pack, 12>& placement, const Field<Pack>& q) { return potential_ = sweeps_.refresh(placement, q); }
 
-  /// action(rotors): of the mass matrix they are the only part that is an effect.
-  template <class Action>
-  void with_rotors(const Action& action) {
-    if (sweeps_.rotors().rows() == 0) return action(NothingAdded{});
-    action(EffectsAdded<Pack, true, false>{sweeps_.rotors(), sweeps_.body_sum().pull});
-  }
-
   /// After the first guess. Lanes are each at their own time.
   void begin(const Block<Real>& block, double h, const Field<Pack>& q, Workspace<Pack>& work) {
     if (sweeps_.plan().joints) std::ranges::copy(work.momentum_target.flat(), sweeps_.plain_target().flat().begin());
@@ -129,9 +122,10 @@ class LaneEffects {
 };
 
 /// Where a scene has none.
-struct NoLaneEffects {
+struct NoLaneEffects : NoEffects {
   template <class Real>
-  explicit NoLaneEffects(const BlockSetup<Real>&) {}
+  explicit NoLaneEffects(const BlockSetup<Real>& setup) : NoEffects(setup.plan, setup.model) {}
+  const NoEffects* operator->() const { return this; }
 };
 
 }  // namespace linden

@@ -97,13 +97,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     if constexpr (kEffects) effects_.load(block);
     Lanes alive = 0;
     for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
-    for (std::int64_t k = 0; k < steps && alive != 0; ++k) {
-      if constexpr (kEffects) {
-        alive = step_with_effects(block, alive);
-      } else {
-        alive = step_once(block, alive);
-      }
-    }
+    for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = step_once(block, alive);
     store(block);
     if constexpr (kEffects) effects_.store(block);
   }
@@ -190,14 +184,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   [[gnu::noinline]] void solve_mass(const Field<Pack>& right_side, Field<Pack>& rate) {
-    const auto factor = [&](const auto& rotors) {
+    effects_->with_rotors([&](const auto& rotors) {
       articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains(), rotors);
-    };
-    if constexpr (kEffects) {
-      effects_.with_rotors(factor);
-    } else {
-      factor(NothingAdded{});
-    }
+    });
     impulse_pass_up(tree_, constants(), work_.placement, gains(), right_side, work_.bias, work_.innovation);
     rate_down(tree_, constants(), work_.placement, gains(), work_.innovation, work_.variation, rate);
   }
@@ -253,94 +242,97 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   /// Returns the lanes still alive.
   Lanes step_once(const Block<Real>& block, Lanes alive) {
-    const Pack h = number(options_.step);
-    momentum_target_map(tree_, h, p_, work_.force, work_.momentum_target);
-    Lanes active = model_.mimics.empty() ? alive : 0, done = 0, lost = alive & ~active;
-    Pack energy = number(0);
-    if (active != 0) {
-      first_guess(block, active);
-      start_down(tree_, constants(), work_);
-      Pack norm = newton_up<true>(tree_, constants(), work_);
-      for (int corrections = 1;; ++corrections) {
-        const Pack before = norm;
-        const Evaluation<Pack> now = correct_down(tree_, constants(), L::mask(active), work_);
-        norm = corrections % 2 == 0 ? newton_up<false>(tree_, constants(), work_) : innovation_up(tree_, constants(), work_);
-        const Pack limit = number(std::numeric_limits<Real>::max());
-        const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
-        Lanes ok = active & usable & L::bits(number(0.5) * norm <= tolerance_squared_ * now.energy);
-        const Lanes left = active & ~ok;
-        if (left != 0) {
-          const Lanes slow = left & usable & ~L::bits(norm <= number(kSlowProgress * kSlowProgress) * before);
-          if (slow != 0) ok |= slow & at_rounding_floor(norm, now.energy);
-          Lanes given_up = left & ~usable;
-          if (corrections > 1) given_up |= left & ~L::bits(norm < before);
-          if (corrections == kMostCorrections) given_up |= left;
-          lost |= given_up & ~ok;
-        }
-        energy = select(L::mask(ok), now.energy, energy);
-        for (int l = 0; l < block.count; ++l) {
-          if ((active >> l & 1u) != 0 && ((ok | lost) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
-        }
-        active &= ~(ok | lost);
-        if (active == 0) {
-          if (done != 0) bring_back(done);
-          done |= ok;
-          break;
-        }
-        if (ok != 0) keep(ok);
-        done |= ok;
-      }
+    momentum_target_map(tree_, number(options_.step), p_, work_.force, work_.momentum_target);
+    if (!model_.mimics.empty()) return finish(block, alive, {.lost = alive});  // joints that are tied are stepped alone
+    first_guess(block, alive);
+    if constexpr (kEffects) {
+      return finish(block, alive, solve_with_effects(block, alive));
+    } else {
+      return finish(block, alive, solve(block, alive));
     }
-    return finish(block, alive, done, lost, energy);
   }
 
-  /// As step_once. The factor is exact and fresh at every evaluation, so that lanes that wait for others compute what they had, and what
-  /// becomes of a lane whose effects change their state depends on itself alone.
-  [[gnu::noinline]] Lanes step_with_effects(const Block<Real>& block, Lanes alive) {
-    const Pack h = number(options_.step);
-    momentum_target_map(tree_, h, p_, work_.force, work_.momentum_target);
-    Lanes active = model_.mimics.empty() ? alive : 0, done = 0, lost = alive & ~active;
-    Pack energy = number(0);
-    if (active != 0) {
-      first_guess(block, active);
-      effects_.begin(block, options_.step, q_, work_);
-      Evaluation<Pack> now = start_down(tree_, constants(), work_);
-      if (effects_->contacts() > 0) effects_->guess_points(work_.displacement, true);
-      Pack norm = effects_.act(constants(), work_, now);
+  struct Solved {
+    Lanes done = 0, lost = 0;
+    Pack energy = number(0);  // h^2 x kinetic energy of the mean motion, of those done
+  };
+
+  Solved solve(const Block<Real>& block, Lanes active) {
+    Solved solved;
+    start_down(tree_, constants(), work_);
+    Pack norm = newton_up<true>(tree_, constants(), work_);
+    for (int corrections = 1;; ++corrections) {
+      const Pack before = norm;
+      const Evaluation<Pack> now = correct_down(tree_, constants(), L::mask(active), work_);
+      norm = corrections % 2 == 0 ? newton_up<false>(tree_, constants(), work_) : innovation_up(tree_, constants(), work_);
       const Pack limit = number(std::numeric_limits<Real>::max());
-      const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
-      for (int corrections = 0;; ++corrections) {
-        const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
-        const Pack scale = now.energy + fall;
-        Lanes ok = usable & L::bits(number(0.5) * norm <= tolerance_squared_ * scale);
-        ok |= usable & ~ok & at_rounding_floor(norm, now.energy);
-        const Lanes settled = ok | (usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale));
-        Lanes changed = 0;
-        if (effects_->plan().revises) {
-          const Mask one_by_one = corrections >= kBulkEffectCorrections ? L::mask(~Lanes{0}) : L::mask(0);
-          changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
-        }
-        ok &= active & ~changed;
-        const Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
-        energy = select(L::mask(ok), now.energy, energy);
-        for (int l = 0; l < block.count; ++l) {
-          if (((ok | given_up) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
-        }
-        done |= ok;
-        lost |= given_up;
-        active &= ~(ok | given_up);
-        if (active == 0) break;
-        now = correct_down(tree_, constants(), L::mask(active & ~changed), work_);
-        norm = effects_.act(constants(), work_, now);
+      const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
+      Lanes ok = active & usable & L::bits(number(0.5) * norm <= tolerance_squared_ * now.energy);
+      const Lanes left = active & ~ok;
+      if (left != 0) {
+        const Lanes slow = left & usable & ~L::bits(norm <= number(kSlowProgress * kSlowProgress) * before);
+        if (slow != 0) ok |= slow & at_rounding_floor(norm, now.energy);
+        Lanes given_up = left & ~usable;
+        if (corrections > 1) given_up |= left & ~L::bits(norm < before);
+        if (corrections == kMostCorrections) given_up |= left;
+        solved.lost |= given_up & ~ok;
       }
+      solved.energy = select(L::mask(ok), now.energy, solved.energy);
+      for (int l = 0; l < block.count; ++l) {
+        if ((active >> l & 1u) != 0 && ((ok | solved.lost) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
+      }
+      active &= ~(ok | solved.lost);
+      if (active == 0) {
+        if (solved.done != 0) bring_back(solved.done);
+        solved.done |= ok;
+        return solved;
+      }
+      if (ok != 0) keep(ok);
+      solved.done |= ok;
     }
-    return finish(block, alive, done, lost, energy);
   }
 
-  Lanes finish(const Block<Real>& block, Lanes alive, Lanes done, Lanes lost, const Pack& energy) {
+  /// The factor is exact and fresh at every evaluation, so that lanes that wait for others compute what they had, and what becomes of a lane
+  /// whose effects change their state depends on itself alone.
+  Solved solve_with_effects(const Block<Real>& block, Lanes active) {
+    Solved solved;
+    effects_.begin(block, options_.step, q_, work_);
+    Evaluation<Pack> now = start_down(tree_, constants(), work_);
+    if (effects_->contacts() > 0) effects_->guess_points(work_.displacement, true);
+    Pack norm = effects_.act(constants(), work_, now);
+    const Pack limit = number(std::numeric_limits<Real>::max());
+    const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
+    for (int corrections = 0;; ++corrections) {
+      const Lanes usable = L::bits(now.least_w > number(0)) & L::bits(norm <= limit) & L::bits(now.energy <= limit);
+      const Pack scale = now.energy + fall;
+      Lanes ok = usable & L::bits(number(0.5) * norm <= tolerance_squared_ * scale);
+      ok |= usable & ~ok & at_rounding_floor(norm, now.energy);
+      const Lanes settled = ok | (usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale));
+      Lanes changed = 0;
+      if (effects_->plan().revises) {
+        const Mask one_by_one = corrections >= kBulkEffectCorrections ? L::mask(~Lanes{0}) : L::mask(0);
+        changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
+      }
+      ok &= active & ~changed;
+      const Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
+      solved.energy = select(L::mask(ok), now.energy, solved.energy);
+      for (int l = 0; l < block.count; ++l) {
+        if (((ok | given_up) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
+      }
+      solved.done |= ok;
+      solved.lost |= given_up;
+      active &= ~(ok | given_up);
+      if (active == 0) return solved;
+      now = correct_down(tree_, constants(), L::mask(active & ~changed), work_);
+      norm = effects_.act(constants(), work_, now);
+    }
+  }
+
+  Lanes finish(const Block<Real>& block, Lanes alive, const Solved& solved) {
+    Lanes done = solved.done, lost = solved.lost;
     const double rate = 1 / options_.step;
     displacement_map(tree_, work_.motion, work_.delta);
-    const Pack kinetic = number(rate * rate) * energy;
+    const Pack kinetic = number(rate * rate) * solved.energy;
     const Pack pace = L::load(block.pace), pace_work = L::load(block.pace + W);
     const Pack work_at_begin = work();
     using std::max;

@@ -3,13 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
+#include "engine/step/extrapolation.hpp"
+
 namespace linden {
-namespace {
-
-/// Next value of the polynomial through the last 1, ..., 4 values, latest first.
-constexpr std::array<double, StageGuess::kRows> kExtrapolation[StageGuess::kRows] = {{1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}};
-
-}  // namespace
 
 StageGuess::StageGuess(std::span<const double> stages, Index velocities)
     : stages_(stages),
@@ -42,7 +38,7 @@ bool StageGuess::predict(std::size_t stage, Field<double, kHistory>& history) {
   const std::int64_t known = known_[stage];
   if (known == 0) return false;
   // rows that are not known are zero
-  const auto [c0, c1, c2, c3] = kExtrapolation[known - 1];
+  const std::array<double, kHistory>& c = polynomial_through(static_cast<int>(known));
   const double *d0 = row(stage, 0), *d1 = row(stage, 1), *d2 = row(stage, 2), *d3 = row(stage, 3);
   // misses of lesser polynomials are larger than those to come
   const auto share = [&](std::size_t k) { return known < kRows ? 0 : stages_[stage] * weights_[stage][k - 1]; };
@@ -50,7 +46,7 @@ bool StageGuess::predict(std::size_t stage, Field<double, kHistory>& history) {
   const double w1 = share(1), w2 = share(2), w3 = share(3), w4 = share(4);
   const double *m1 = miss(1), *m2 = miss(2), *m3 = miss(3), *m4 = miss(4);
   for (std::size_t v = 0; v < velocities_; ++v) {
-    extrapolated_[v] = c0 * d0[v] + c1 * d1[v] + c2 * d2[v] + c3 * d3[v];
+    extrapolated_[v] = c[0] * d0[v] + c[1] * d1[v] + c[2] * d2[v] + c[3] * d3[v];
     history(static_cast<Index>(v), 0) = extrapolated_[v] + w1 * m1[v] + w2 * m2[v] + w3 * m3[v] + w4 * m4[v];
   }
   return true;

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "engine/options.hpp"
-#include "engine/step/effect_sweeps.hpp"
+#include "engine/step/effect_plan.hpp"
+#include "engine/step/effect_work.hpp"
 #include "engine/step_report.hpp"
 #include "layout/state.hpp"
 

@@ -263,22 +263,6 @@ void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated& now) {
   }
 }
 
-/// action(added): what effects add to a factor.
-template <bool kEffects>
-template <class Action>
-void TreeSweeps<kEffects>::with_added(const Action& action) {
-  if constexpr (kEffects) {
-    const Field<double>& stiffness = effects_.joint_sum().stiffness;
-    const Field<double, 36>& pull = effects_.body_sum().pull;
-    const EffectPlan& plan = effects_.plan();
-    if (plan.joints && plan.bodies) return action(EffectsAdded<double, true, true>{stiffness, pull});
-    if (plan.joints) return action(EffectsAdded<double, true, false>{stiffness, pull});
-    action(EffectsAdded<double, false, true>{stiffness, pull});
-  } else {
-    action(NothingAdded{});
-  }
-}
-
 template <bool kEffects>
 void TreeSweeps<kEffects>::begin(bool known, double scale) {
   guess_points_ = true;
@@ -289,12 +273,12 @@ void TreeSweeps<kEffects>::begin(bool known, double scale) {
 template <bool kEffects>
 void TreeSweeps<kEffects>::factor() {
   if (options_.solver == Solver::riqn) {
-    with_added([&](const auto& added) {
+    effects_.with_added([&](const auto& added) {
       articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
     });
     return tie_rates();
   }
-  with_added([&](const auto& added) {
+  effects_.with_added([&](const auto& added) {
     newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains(), added);
   });
   if (ties_.empty()) return;
@@ -331,7 +315,7 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::pass_up(Evaluated& now, bool fresh) {
   if (one_pass_) {
     now.norm = 0;
-    return with_added([&](const auto& added) {
+    return effects_.with_added([&](const auto& added) {
       in_parts_up(all_slots(model_.tree), [&](Slots part) { now.norm += pass_part(part, fresh, added); });
     });
   }
@@ -437,19 +421,9 @@ bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, 
   return norm <= unit * unit * sum;
 }
 
-/// action(rotors): of the mass matrix they are the only part that is an effect.
-template <bool kEffects>
-template <class Action>
-void TreeSweeps<kEffects>::with_rotors(const Action& action) {
-  if constexpr (kEffects) {
-    if (effects_.rotors().rows() > 0) return action(EffectsAdded<double, true, false>{effects_.rotors(), effects_.body_sum().pull});
-  }
-  action(NothingAdded{});
-}
-
 template <bool kEffects>
 void TreeSweeps<kEffects>::factor_mass() {
-  with_rotors([&](const auto& rotors) {
+  effects_.with_rotors([&](const auto& rotors) {
     articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), rotors);
   });
   tie_rates();

@@ -101,11 +101,7 @@ class TreeSweeps {
   Evaluated evaluate_motions(StepReport& report, bool fresh, const Motions& motions);
   template <class Added>
   double pass_part(Slots part, bool fresh, const Added& added);
-  template <class Action>
-  void with_added(const Action& action);
   void act(Evaluated& now);
-  template <class Action>
-  void with_rotors(const Action& action);
   void forces(Slots part);
   void pass_up(Evaluated& now, bool fresh);
   void factor();
