@@ -21,9 +21,7 @@ class AlonePeer : public Peer {
     simulation_.set_velocities(start.velocities);
   }
   void step(int n) override {
-    for (int k = 0; k < n; ++k) {
-      if (const StepReport report = simulation_.step(); !report.ok()) throw std::runtime_error(simulation_.describe(report));
-    }
+    if (const StepsReport report = simulation_.run(n); !report.ok()) throw std::runtime_error(simulation_.describe(report.last));
   }
 
   std::vector<double> positions(std::int64_t) override {

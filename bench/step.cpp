@@ -19,6 +19,7 @@
 namespace linden {
 namespace {
 
+constexpr std::int64_t kTogether = 10;
 constexpr std::int64_t kEpisode = 1000;  // steps from the random start, then from there again
 
 void step(benchmark::State& state, const Model& model, Solver solver) {
@@ -27,17 +28,20 @@ void step(benchmark::State& state, const Model& model, Solver solver) {
   simulation.set_positions(start.positions);
   simulation.set_velocities(start.velocities);
   const Energy before = simulation.energy();
-  for (int k = 0; k < 10; ++k) {
-    if (const StepReport report = simulation.step(); !report.ok()) return state.SkipWithError(simulation.describe(report).c_str());
-  }
+  const auto go_on = [&] {
+    const StepsReport report = simulation.run(kTogether);
+    if (!report.ok()) state.SkipWithError(simulation.describe(report.last).c_str());
+    return report;
+  };
+  if (!go_on().ok()) return;
   const Energy after = simulation.energy();
   if (!(std::abs(after.total() - before.total()) < 1e-3 * (before.kinetic + after.kinetic))) {
     return state.SkipWithError("energy is not kept");
   }
-  double iterations = 0, evaluations = 0, steps = 0;
-  std::int64_t since_start = 10;
-  for (auto _ : state) {
-    if (since_start++ == kEpisode) {
+  StepsReport taken;
+  std::int64_t since_start = kTogether;
+  while (state.KeepRunningBatch(kTogether)) {
+    if (since_start == kEpisode) {
       // every table shows the same motion, however long its rows are timed
       state.PauseTiming();
       simulation.set_positions(start.positions);
@@ -45,14 +49,12 @@ void step(benchmark::State& state, const Model& model, Solver solver) {
       since_start = 0;
       state.ResumeTiming();
     }
-    const StepReport report = simulation.step();
-    if (!report.ok()) return state.SkipWithError(simulation.describe(report).c_str());
-    iterations += report.iterations;
-    evaluations += report.evaluations;
-    steps += 1;
+    taken.add(go_on());
+    if (!taken.ok()) return;
+    since_start += kTogether;
   }
-  state.counters["iterations"] = iterations / steps;
-  state.counters["evaluations"] = evaluations / steps;
+  state.counters["iterations"] = static_cast<double>(taken.iterations) / static_cast<double>(taken.steps);
+  state.counters["evaluations"] = static_cast<double>(taken.evaluations) / static_cast<double>(taken.steps);
   per_body(state, model.tree.bodies());
 }
 

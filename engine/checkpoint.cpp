@@ -1,10 +1,10 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
-//   "linden checkpoint 3\n"
-//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of effects' numbers (little endian, as laid out below)
+//   "linden checkpoint 4\n"
+//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of the stepper's numbers (little endian, as laid out below)
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
 //   where a step has sub-steps, what their first guesses know (engine/step/stage_guess.hpp): counts, numbers
-//   what effects keep from step to step, 8 bytes a number
+//   what effects or the solver keep from step to step, 8 bytes a number
 //   FNV-1a over all of it
 //
 // Raw bits, so that a run continued from it is bit-identical. Written beside the target and renamed: nothing half-written stays.
@@ -23,7 +23,7 @@
 namespace linden {
 namespace {
 
-constexpr std::string_view kMagic = "linden checkpoint 3\n";
+constexpr std::string_view kMagic = "linden checkpoint 4\n";
 constexpr std::int64_t kMostSteps = std::int64_t{1} << 53;  // beyond it their count times the step has no double of its own
 
 struct Header {
@@ -34,7 +34,7 @@ struct Header {
   std::int64_t steps;
   std::int64_t history;
   std::int64_t order;
-  std::int64_t effects;  // numbers that effects keep
+  std::int64_t kept;  // numbers that effects or the solver keep
 };
 static_assert(sizeof(Header) == 88, "a checkpoint's header has no padding");
 
@@ -66,7 +66,7 @@ void Simulation::save(const std::string& file) {
                       steps_,
                       history_,
                       options_.order,
-                      count_of(stepper_->effect_memory())};
+                      count_of(stepper_->memory())};
   std::string bytes(kMagic);
   append(bytes, &header, 1);
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
@@ -76,7 +76,7 @@ void Simulation::save(const std::string& file) {
     append(bytes, stage_guess_->known().data(), stage_guess_->known().size());
     append(bytes, stage_guess_->numbers().data(), stage_guess_->numbers().size());
   }
-  for (const std::span<double> numbers : stepper_->effect_memory()) append(bytes, numbers.data(), numbers.size());
+  for (const std::span<double> numbers : stepper_->memory()) append(bytes, numbers.data(), numbers.size());
   const std::uint64_t sum = checksum(bytes);
   append(bytes, &sum, 1);
 
@@ -106,10 +106,10 @@ void Simulation::load(const std::string& file) {
                                  "same run",
                                  file, header.order, options_.order));
   }
-  const std::vector<std::span<double>> memory = stepper_->effect_memory();
-  if (header.effects != count_of(memory)) {
-    throw InputError(fmt::format("{}: this checkpoint was made with other effects than the simulation has, so it would not continue the "
-                                 "same run; load it with the scene that it was made with",
+  const std::vector<std::span<double>> memory = stepper_->memory();
+  if (header.kept != count_of(memory)) {
+    throw InputError(fmt::format("{}: this checkpoint was made with other effects or another way to solve than the simulation has, so it "
+                                 "would not continue the same run; load it with the scene and options that it was made with",
                                  file));
   }
   if (header.step != options_.step || !std::equal(std::begin(header.gravity), std::end(header.gravity), options_.gravity.begin())) {

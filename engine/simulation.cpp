@@ -134,8 +134,16 @@ void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, cons
   wrench->moment = moment;
 }
 
-StepReport Simulation::step() {
-  const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step);
+StepReport Simulation::step() { return take_step(false); }
+
+StepsReport Simulation::run(std::int64_t steps) {
+  StepsReport report;
+  while (report.steps < steps && report.ok()) report.add(take_step(report.steps + 1 < steps));
+  return report;
+}
+
+StepReport Simulation::take_step(bool another) {
+  const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, another);
   if (report.ok()) {
     ++steps_;
     effect_work_.add(stepper_->effect_work());
@@ -153,7 +161,7 @@ StepReport Simulation::step_in_stages() {
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const bool known = extrapolates ? stage_guess_->predict(i, state_.history) : stage_guess_->repeat(i, state_.history);
     history_ = known ? 1 : 0;
-    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step);
+    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step, false);
     whole.add(report);
     if (report.ok()) {
       if (history_ > 0) {

@@ -5,6 +5,7 @@
 //   simulation.set_positions(q);  simulation.set_velocities(v);
 //   const StepReport report = simulation.step();
 //   if (!report.ok()) ... simulation.describe(report) ...
+//   simulation.run(1000);
 //
 // Positions are [nq], velocities and momenta [nv]; which row is which joint says model().names. Quaternions are x y z w. The
 // velocity of a ball joint is its angular velocity in the body's frame; of a free joint angular then linear, in the body's frame.
@@ -70,6 +71,9 @@ class Simulation {
 
   /// One step. A report that is not ok() leaves the state as it was before.
   StepReport step();
+  /// So many steps, or fewer where one fails: the same motion to the last bit. A large tree is gone over once less a step so, and takes up
+  /// to a fifth less time.
+  StepsReport run(std::int64_t steps);
   std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
 
   Energy energy();
@@ -86,6 +90,7 @@ class Simulation {
  private:
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
+  StepReport take_step(bool another);
   StepReport step_in_stages();
 
   std::shared_ptr<const Model> model_;

@@ -18,6 +18,33 @@ void StepReport::add(const StepReport& more) {
   residual = more.ok() ? std::max(residual, more.residual) : more.residual;
 }
 
+void StepsReport::add(const StepReport& step) {
+  last = step;
+  if (!step.ok()) return;
+  steps += 1;
+  iterations += step.iterations;
+  evaluations += step.evaluations;
+  factorisations += step.factorisations;
+  substeps += step.substeps;
+  most_iterations = std::max(most_iterations, step.iterations);
+  split_steps += step.substeps > 1 ? 1 : 0;
+  floor_steps += step.at_rounding_floor ? 1 : 0;
+  largest_residual = std::max(largest_residual, step.residual);
+}
+
+void StepsReport::add(const StepsReport& more) {
+  steps += more.steps;
+  iterations += more.iterations;
+  evaluations += more.evaluations;
+  factorisations += more.factorisations;
+  substeps += more.substeps;
+  most_iterations = std::max(most_iterations, more.most_iterations);
+  split_steps += more.split_steps;
+  floor_steps += more.floor_steps;
+  largest_residual = std::max(largest_residual, more.largest_residual);
+  last = more.last;
+}
+
 std::string describe(const StepReport& report, const Model& model, double step) {
   if (report.ok()) return {};
   const auto slot = static_cast<std::size_t>(report.slot);

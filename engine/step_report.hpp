@@ -2,6 +2,7 @@
 // What a step tells its caller: how the solve went, and where it failed.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "layout/model.hpp"
@@ -30,6 +31,20 @@ struct StepReport {
   /// Counts what another sub-step took; its status and trouble are those of the whole.
   void add(const StepReport& more);
   bool ok() const { return status == StepStatus::converged; }
+};
+
+/// What several steps took together. The one that failed is not counted.
+struct StepsReport {
+  std::int64_t steps = 0;
+  std::int64_t iterations = 0, evaluations = 0, factorisations = 0, substeps = 0;
+  int most_iterations = 0;
+  std::int64_t split_steps = 0, floor_steps = 0;  // that were split; that ended at the rounding floor
+  double largest_residual = 0;
+  StepReport last;  // of the last step, or of the one that failed
+
+  void add(const StepReport& step);
+  void add(const StepsReport& more);
+  bool ok() const { return last.ok(); }
 };
 
 /// One sentence: what failed, at which body and joint, by how much, and what to do. Empty for a step that converged.

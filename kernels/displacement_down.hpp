@@ -53,7 +53,7 @@ S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field
       const auto M = load<Displacement, S>(motion, slots.row(i));
       const Index parent = tree.parent(i);
       if (parent != i - 1) D = load<Displacement, S>(displacement, slots.row_of_parent(parent));
-      D = moved(joint, D, load<Placement, S>(placement, i), M);
+      D = moved(joint, D, load<Placement, S>(placement, slots.row(i)), M);
       store(displacement, slots.row(i), D);
       least = min(least, min(D.r.w, M.r.w));
     }
@@ -63,7 +63,7 @@ S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field
       const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
         const auto M = gather<Displacement>(bodies, motion, slots.row(i));
         const auto above = gather_at<Displacement>(bodies, displacement, rows_of_parents(tree, slots, i).data());
-        const auto next = moved(joint, above, gather<Placement>(bodies, placement, i), M);
+        const auto next = moved(joint, above, gather<Placement>(bodies, placement, slots.row(i)), M);
         scatter(bodies, displacement, slots.row(i), next);
         least = min(least, least_of(bodies, min(next.r.w, M.r.w)));
       };

@@ -24,7 +24,7 @@ void gravity_field_down(const Tree& tree, const Field<S, 12>& placement, const V
   for (Index i = slots.begin; i < slots.end; ++i) {
     const Index parent = tree.parent(i);
     if (parent != i - 1) g = load<Vec3, S>(field, slots.row_of_parent(parent));
-    g = transpose_times(load<Placement, S>(placement, i).R, g);
+    g = transpose_times(load<Placement, S>(placement, slots.row(i)).R, g);
     store(field, slots.row(i), g);
   }
 }
@@ -54,7 +54,7 @@ void gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants,
     const auto g = load<Vec3, S>(field, slots.row(i));
     const S mass = as<S>(constants.subtree_mass(i));
     store_joint(joint, force, tree.first_v(i), project(joint, constants, i, Wrench<S>{cross(c, g), mass * g}));
-    const auto X = load<Placement, S>(placement, i);
+    const auto X = load<Placement, S>(placement, slots.row(i));
     const Vec3<S> passed = X.R * c + mass * X.p;
     // a parent that comes next and has no other child takes it from the registers
     const Index parent = tree.parent(i);

@@ -85,7 +85,7 @@ void increment_down(const Tree& tree, const BodyConstants<Element>& constants, c
                     const Field<S, 7>& motion, const Gains<S>& gains, const Field<S>& innovation, Slots slots,
                     Field<S, 6>& variation, Field<S>& increment) {
   const auto placement_of = [&](auto joint, auto bodies, Index i) LINDEN_INLINE_LAMBDA {
-    return after_motion(joint, gather<Placement>(bodies, placement, i), gather<Displacement>(bodies, motion, slots.row(i)));
+    return after_motion(joint, gather<Placement>(bodies, placement, slots.row(i)), gather<Displacement>(bodies, motion, slots.row(i)));
   };
   yield_down<EachEta>(tree, constants, placement_of, gains, innovation, slots, variation, increment);
 }

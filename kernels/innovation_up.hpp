@@ -84,7 +84,7 @@ template <class S, class Element>
       const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
       store_joint(joint, work.innovation, row, u);
       const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
-      climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, i), passed));
+      climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, slots.row(i)), passed));
     }
   };
   stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
@@ -99,7 +99,7 @@ template <class S, class Element>
         scatter_row(bodies, work.innovation, row, u);
         norm = norm + summed(bodies, abs(u * gather_row(bodies, gains.inverse, tree.first_block(i)) * u));
         const auto passed = E - u * gather<Wrench>(bodies, gains.up, row);
-        add_at(bodies, work.impulse, rows_of_parents(tree, slots, i).data(), to_parent(gather<Placement>(bodies, work.placement, i), passed));
+        add_at(bodies, work.impulse, rows_of_parents(tree, slots, i).data(), to_parent(gather<Placement>(bodies, work.placement, slots.row(i)), passed));
       };
       for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {

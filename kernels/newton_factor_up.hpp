@@ -124,7 +124,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
   settle();
   eliminate_screw(bodies, tree, constants, i, A, gains, felt, added);
   settle();
-  const auto X = gather<Placement>(bodies, placement, i);
+  const auto X = gather<Placement>(bodies, placement, slots.row(i));
   const auto X_pose = after_motion(Joint<JointKind::screw>{}, X, gather<Displacement>(bodies, motion, slots.row(i)));
   to_parent(X, X_pose, felt, [&](int at, const BodyPack& value) LINDEN_INLINE_LAMBDA { A[at] = value; });
   settle();
@@ -172,14 +172,14 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
         const Rows6 turned = by_columns ? turned_over(pull) : pull;
         for (int k = 0; k < 6; ++k) A.r[k] += turned.r[k];
       }
-      const auto X = load<Placement, double>(placement, i);
+      const auto X = load<Placement, double>(placement, slots.row(i));
       const auto X_pose = after_motion(joint, X, load<Displacement, double>(motion, slots.row(i)));
       Rows6 passed;
       if constexpr (joint == JointKind::screw) {
         double after[12];
         X_pose.to(after);
-        passed = by_columns ? pass_screw<true>(tree, constants, i, A, placement.row(i), after, gains, added)
-                            : pass_screw<false>(tree, constants, i, A, placement.row(i), after, gains, added);
+        passed = by_columns ? pass_screw<true>(tree, constants, i, A, placement.row(slots.row(i)), after, gains, added)
+                            : pass_screw<false>(tree, constants, i, A, placement.row(slots.row(i)), after, gains, added);
       } else {
         passed = pass_joint(joint, tree, constants, i, by_columns, A, X, X_pose, gains, added);
       }

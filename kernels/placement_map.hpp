@@ -47,10 +47,10 @@ void placement_map(const Tree& tree, const BodyConstants<Element>& constants, co
       const Index shift = tree.first_q(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
         const auto X = gather<Placement>(bodies, constants.tree_placement, i);
-        scatter(bodies, placement, i, placed(X, gather<Screw>(bodies, constants.screw, i), gather_row(bodies, q, i + shift)));
+        scatter(bodies, placement, slots.row(i), placed(X, gather<Screw>(bodies, constants.screw, i), gather_row(bodies, q, i + shift)));
       });
     } else {
-      for (Index i = part.begin; i < part.end; ++i) store(placement, i, placed(joint, constants, i, tree.first_q(i), q));
+      for (Index i = part.begin; i < part.end; ++i) store(placement, slots.row(i), placed(joint, constants, i, tree.first_q(i), q));
     }
   });
 }

@@ -279,7 +279,8 @@ class Printer {
       before = sweep.when;
     }
     fmt::print("{}", table.text("  "));
-    fmt::print("  evaluation: of the first guess and after every correction; once a step: again where a correction gains little.\n"
+    fmt::print("  evaluation: of the first guess and after every correction; factor: where that of an earlier step does not\n"
+               "  serve, and again where a correction gains little.\n"
                "  ns/body: of each sweep alone on this machine, over the whole tree\n");
   }
 

@@ -93,20 +93,21 @@ class Execution {
     Progress progress(figures_.steps_planned, simulation_.options().step);
     std::int64_t chunk = 1;  // steps between two looks at the clock
     sample();
-    while (figures_.steps < figures_.steps_planned && figures_.failure.empty() && interrupt.signal() == 0) {
-      const std::int64_t end = std::min({figures_.steps_planned, figures_.steps + chunk, next_sample_});
+    while (figures_.run.steps < figures_.steps_planned && figures_.failure.empty() && interrupt.signal() == 0) {
+      const std::int64_t end = std::min({figures_.steps_planned, figures_.run.steps + chunk, next_sample_});
       const Clock::time_point begin = Clock::now();
-      while (figures_.steps < end && interrupt.signal() == 0 && step()) continue;
+      figures_.run.add(simulation_.run(end - figures_.run.steps));
+      if (!figures_.run.ok()) figures_.failure = simulation_.describe(figures_.run.last);
       const Clock::time_point now = Clock::now();
       const double taken = seconds(now - begin);
       figures_.step_seconds += taken;
       if (taken > 0.04) chunk = std::max<std::int64_t>(1, chunk / 2);
       if (taken < 0.01) chunk = std::min(2 * chunk, figures_.sampled_every);
-      if (figures_.steps == next_sample_) sample();
-      progress.update(figures_.steps, now);
+      if (figures_.run.steps == next_sample_) sample();
+      progress.update(figures_.run.steps, now);
     }
-    if (last_sample_ != figures_.steps) sample();
-    if (figures_.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
+    if (last_sample_ != figures_.run.steps) sample();
+    if (figures_.run.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
   }
 
   /// Everything that was asked for. Complaints go to stderr; true where there were none.
@@ -131,24 +132,6 @@ class Execution {
   const std::vector<std::string>& written() const { return written_; }
 
  private:
-  bool step() {
-    const StepReport report = simulation_.step();
-    if (!report.ok()) {
-      figures_.failure = simulation_.describe(report);
-      return false;
-    }
-    figures_.steps += 1;
-    figures_.iterations += report.iterations;
-    figures_.evaluations += report.evaluations;
-    figures_.factorisations += report.factorisations;
-    figures_.substeps += report.substeps;
-    figures_.most_iterations = std::max(figures_.most_iterations, report.iterations);
-    figures_.split_steps += report.substeps > 1 ? 1 : 0;
-    figures_.floor_steps += report.at_rounding_floor ? 1 : 0;
-    figures_.largest_residual = std::max(figures_.largest_residual, report.residual);
-    return true;
-  }
-
   void sample() {
     const Energy energy = simulation_.energy();
     figures_.taken = simulation_.effect_work().taken();
@@ -160,8 +143,8 @@ class Execution {
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
     if (recorder_) recorder_->add(simulation_.time(), energy.total(), simulation_.positions());
     if (!arguments_.plot.empty()) trace({simulation_.time(), account.total() - figures_.energy.initial()});
-    last_sample_ = figures_.steps;
-    next_sample_ = figures_.steps + figures_.sampled_every;
+    last_sample_ = figures_.run.steps;
+    next_sample_ = figures_.run.steps + figures_.sampled_every;
   }
 
   void trace(plot::Point point) {
@@ -183,7 +166,7 @@ class Execution {
 
 /// What to say of a run that did not reach its end.
 std::string ending(const Execution& run, const RunFigures& figures, const Options& options) {
-  const std::int64_t done = figures.steps;
+  const std::int64_t done = figures.run.steps;
   const double time = figures.begin + figures.simulated(options.step);
   const std::string files = run.written().empty() ? "" : fmt::format("; {} {} valid up to there", fmt::join(run.written(), ", "),
                                                                      run.written().size() == 1 ? "is" : "are");

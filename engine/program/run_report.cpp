@@ -21,10 +21,10 @@ std::string begin_text(const RunArguments& arguments, const RunFigures& figures)
 
 double mean(std::int64_t sum, std::int64_t count) { return static_cast<double>(sum) / static_cast<double>(count); }
 
-double steps_per_second(const RunFigures& figures) { return static_cast<double>(figures.steps) / figures.step_seconds; }
+double steps_per_second(const RunFigures& figures) { return static_cast<double>(figures.run.steps) / figures.step_seconds; }
 
 double ns_per_body_step(const Model& model, const RunFigures& figures) {
-  return 1e9 * figures.step_seconds / (static_cast<double>(figures.steps) * model.tree.bodies());
+  return 1e9 * figures.step_seconds / (static_cast<double>(figures.run.steps) * model.tree.bodies());
 }
 
 /// "order 4 (5 sub-steps), "; of order 2, which most runs have, nothing.
@@ -69,26 +69,26 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}){}, first guess {}, {}", name(options.solver), order_text(options),
                             options.step, options.tolerance, name(options.stop), reduction_text(options), name(options.guess),
                             gravity_text(options)));
-  if (figures.steps == 0) return text;
+  if (figures.run.steps == 0) return text;
 
   const double simulated = figures.simulated(options.step);
   row("run", figures.complete()
-                 ? fmt::format("{:.6g} s, {}", simulated, counted(figures.steps, "step"))
+                 ? fmt::format("{:.6g} s, {}", simulated, counted(figures.run.steps, "step"))
                  : fmt::format("{:.6g} of {:.6g} s, {} of {}", simulated, static_cast<double>(figures.steps_planned) * options.step,
-                               grouped(figures.steps), counted(figures.steps_planned, "step")));
+                               grouped(figures.run.steps), counted(figures.steps_planned, "step")));
   row("speed", fmt::format("{} steps/s, {:.0f} ns per body and step, {:.3g} times real time",
                            grouped(std::llround(steps_per_second(figures))), ns_per_body_step(model, figures),
                            simulated / figures.step_seconds));
   row("iterations", fmt::format("mean {:.2f}, largest {}; {:.2f} evaluations of the residual per step",
-                                mean(figures.iterations, figures.steps), figures.most_iterations,
-                                mean(figures.evaluations, figures.steps)));
-  if (figures.split_steps > 0) {
-    row("", fmt::format("{} {} split, {} sub-steps in all: a smaller --dt keeps energy better", counted(figures.split_steps, "step"),
-                        plural(figures.split_steps, "was", "were"), grouped(figures.substeps)));
+                                mean(figures.run.iterations, figures.run.steps), figures.run.most_iterations,
+                                mean(figures.run.evaluations, figures.run.steps)));
+  if (figures.run.split_steps > 0) {
+    row("", fmt::format("{} {} split, {} sub-steps in all: a smaller --dt keeps energy better", counted(figures.run.split_steps, "step"),
+                        plural(figures.run.split_steps, "was", "were"), grouped(figures.run.substeps)));
   }
-  if (figures.floor_steps > 0) {
+  if (figures.run.floor_steps > 0) {
     row("", fmt::format("{} stopped above the tolerance, where rounding lets the residual fall no further (largest {:.1e})",
-                        counted(figures.floor_steps, "step"), figures.largest_residual));
+                        counted(figures.run.floor_steps, "step"), figures.run.largest_residual));
   }
 
   const EnergyDrift& energy = figures.energy;
@@ -124,7 +124,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
   const Model& model = simulation.model();
   const Options& options = simulation.options();
   const auto random = randomness(arguments);
-  const bool ran = figures.steps > 0;
+  const bool ran = figures.run.steps > 0;
   const bool isolated = figures.momentum && !figures.momentum->gravity();
   using Json = nlohmann::ordered_json;
   const auto if_any = [](bool any, double value) { return any && std::isfinite(value) ? Json(value) : Json(nullptr); };
@@ -163,20 +163,20 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"time_begin", figures.begin},
       {"duration", figures.simulated(options.step)},
       {"steps_planned", figures.steps_planned},
-      {"steps", figures.steps},
+      {"steps", figures.run.steps},
       {"wall_seconds", figures.step_seconds},
       {"total_seconds", figures.total_seconds},
       {"steps_per_second", if_any(ran, steps_per_second(figures))},
       {"ns_per_body_step", if_any(ran, ns_per_body_step(model, figures))},
       {"real_time_factor", if_any(ran, figures.simulated(options.step) / figures.step_seconds)},
-      {"iterations_mean", if_any(ran, mean(figures.iterations, figures.steps))},
-      {"iterations_max", figures.most_iterations},
-      {"evaluations_mean", if_any(ran, mean(figures.evaluations, figures.steps))},
-      {"factorisations_mean", if_any(ran, mean(figures.factorisations, figures.steps))},
-      {"substeps", figures.substeps},
-      {"split_steps", figures.split_steps},
-      {"rounding_floor_steps", figures.floor_steps},
-      {"residual_max", figures.largest_residual},
+      {"iterations_mean", if_any(ran, mean(figures.run.iterations, figures.run.steps))},
+      {"iterations_max", figures.run.most_iterations},
+      {"evaluations_mean", if_any(ran, mean(figures.run.evaluations, figures.run.steps))},
+      {"factorisations_mean", if_any(ran, mean(figures.run.factorisations, figures.run.steps))},
+      {"substeps", figures.run.substeps},
+      {"split_steps", figures.run.split_steps},
+      {"rounding_floor_steps", figures.run.floor_steps},
+      {"residual_max", figures.run.largest_residual},
       {"energy_initial", energy.initial()},
       {"energy_taken", figures.taken},
       {"energy_given", figures.given},
@@ -214,7 +214,7 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
   chart.title = fmt::format("Energy drift of {}", printable(simulation.model().names.model));
   chart.subtitle = fmt::format("{}, {}; {}, {}step {:g} s, {}, {}; start {}; H(0) = {:.6g} J",
                                counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
-                               order_text(options), options.step, counted(figures.steps, "step"), gravity_text(options), begin_text(arguments, figures),
+                               order_text(options), options.step, counted(figures.run.steps, "step"), gravity_text(options), begin_text(arguments, figures),
                                energy.initial());
   chart.x.label = "time [s]";
   const bool effects = !effect_lines(arguments.effects(), simulation.model()).empty();

@@ -10,20 +10,18 @@
 #include "engine/drift.hpp"
 #include "engine/program/plot.hpp"
 #include "engine/program/run_command.hpp"
+#include "engine/step_report.hpp"
 
 namespace linden {
 
 /// Counted while a run goes on.
 struct RunFigures {
-  std::int64_t steps_planned = 0, steps = 0;
+  std::int64_t steps_planned = 0;
+  StepsReport run;
   std::int64_t sampled_every = 1;  // steps between samples of energy and momentum
   double begin = 0;                // time at the first sample [s]
-  double step_seconds = 0;         // by the clock, within Simulation::step
+  double step_seconds = 0;         // by the clock, within Simulation::run
   double total_seconds = 0;        // by the clock, everything
-  std::int64_t iterations = 0, evaluations = 0, factorisations = 0, substeps = 0;
-  int most_iterations = 0;
-  std::int64_t split_steps = 0, floor_steps = 0;
-  double largest_residual = 0;
   EnergyDrift energy;          // of H plus what effects took less what they gave
   double taken = 0, given = 0;  // by effects since the first sample [J]
   std::optional<MomentumDrift> momentum;
@@ -32,7 +30,7 @@ struct RunFigures {
   int signal = 0;                  // that ended the run
 
   bool complete() const { return failure.empty() && signal == 0; }
-  double simulated(double step) const { return static_cast<double>(steps) * step; }
+  double simulated(double step) const { return static_cast<double>(run.steps) * step; }
 };
 
 /// What to say of a run whose energy strays so far that the motion cannot be trusted; empty for others.

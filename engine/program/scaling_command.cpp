@@ -41,6 +41,7 @@ constexpr std::array<ScalingShape, 6> kShapes{{
 
 constexpr Index kMostFreedom = 10'000'000;
 constexpr std::int64_t kStretches = 5;
+constexpr std::int64_t kTogether = 20;  // steps between two questions whether to go on
 constexpr double kSeconds = 0.3;  // of the measured steps of a row
 
 /// Names of the models, small to large.
@@ -112,33 +113,24 @@ class Measurement {
     double shortest = kSeconds;
     for (int k = 0; k <= kHistory && going(); ++k) {
       const Clock::time_point begin = Clock::now();
-      step();
+      take(1);
       shortest = std::min(shortest, seconds(Clock::now() - begin));
     }
     return std::max(shortest, 1e-8);
   }
 
   void stretch(std::int64_t steps) {
-    const std::int64_t end = row_.steps + steps;
+    const std::int64_t end = row_.run.steps + steps;
     const Clock::time_point begin = Clock::now();
-    while (row_.steps < end && going()) count(step());
+    while (row_.run.steps < end && going()) row_.run.add(take(std::min(kTogether, end - row_.run.steps)));
     if (steps > 0) row_.seconds.push_back(seconds(Clock::now() - begin) / static_cast<double>(steps));
     if (!row_.failed()) look();
   }
 
-  StepReport step() {
-    const StepReport report = simulation_.step();
-    if (!report.ok()) row_.failure = fmt::format("step {}: {}", grouped(simulation_.steps() + 1), simulation_.describe(report));
+  StepsReport take(std::int64_t steps) {
+    const StepsReport report = simulation_.run(steps);
+    if (!report.ok()) row_.failure = fmt::format("step {}: {}", grouped(simulation_.steps() + 1), simulation_.describe(report.last));
     return report;
-  }
-
-  void count(const StepReport& report) {
-    if (!report.ok()) return;
-    row_.steps += 1;
-    row_.iterations += report.iterations;
-    row_.evaluations += report.evaluations;
-    row_.most_iterations = std::max(row_.most_iterations, report.iterations);
-    row_.split_steps += report.substeps > 1 ? 1 : 0;
   }
 
   void look() {

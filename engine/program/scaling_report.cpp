@@ -40,13 +40,13 @@ std::string four_digits(double value) {
 }
 
 std::vector<std::string> cells(const ScalingRow& row) {
-  std::vector<std::string> result{std::string(name(row.solver)), grouped(row.bodies), grouped(row.dofs), grouped(row.steps)};
+  std::vector<std::string> result{std::string(name(row.solver)), grouped(row.bodies), grouped(row.dofs), grouped(row.run.steps)};
   if (row.failed()) {
     result.insert(result.end(), {"failed", "-", "-", "-", "-", "-"});
   } else {
     result.insert(result.end(), {four_digits(1e6 * row.seconds_per_step()), fmt::format("{:.0f}", row.ns_per_body()),
                                  fmt::format("{:.2f}", row.evaluations_mean()), fmt::format("{:.2f}", row.iterations_mean()),
-                                 fmt::format("{}", row.most_iterations), grouped(row.split_steps)});
+                                 fmt::format("{}", row.run.most_iterations), grouped(row.run.split_steps)});
   }
   result.push_back(memory_text(row.bytes));
   const double change = row.energy_change();
@@ -134,15 +134,15 @@ nlohmann::ordered_json scaling_json(const ScalingArguments& arguments, const Sca
                     {"model", row.model},
                     {"bodies", row.bodies},
                     {"dofs", row.dofs},
-                    {"steps", row.steps},
+                    {"steps", row.run.steps},
                     {"seconds_per_step", if_any(ran, row.seconds_per_step())},
                     {"seconds_per_step_least", if_any(ran, ran ? std::ranges::min(row.seconds) : 0)},
                     {"seconds_per_step_most", if_any(ran, ran ? std::ranges::max(row.seconds) : 0)},
                     {"ns_per_body_step", if_any(ran, row.ns_per_body())},
                     {"evaluations_mean", if_any(ran, row.evaluations_mean())},
                     {"iterations_mean", if_any(ran, row.iterations_mean())},
-                    {"iterations_max", row.most_iterations},
-                    {"split_steps", row.split_steps},
+                    {"iterations_max", row.run.most_iterations},
+                    {"split_steps", row.run.split_steps},
                     {"bytes", row.bytes},
                     {"energy_change", if_any(ran, row.energy_change())},
                     {"failure", row.failed() ? Json(row.failure) : Json(nullptr)}});

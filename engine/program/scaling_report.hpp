@@ -9,6 +9,7 @@
 #include "engine/program/plot.hpp"
 #include "engine/program/power_law.hpp"
 #include "engine/program/scaling_command.hpp"
+#include "engine/step_report.hpp"
 
 namespace linden {
 
@@ -18,8 +19,7 @@ struct ScalingRow {
   std::string model;
   Index bodies = 0, dofs = 0;
   std::size_t bytes = 0;  // state, workspace, constants and tree
-  std::int64_t steps = 0, iterations = 0, evaluations = 0, split_steps = 0;
-  int most_iterations = 0;
+  StepsReport run;
   std::vector<double> seconds;                            // per step, of each stretch
   double first_energy = 0, last_energy = 0, kinetic = 0;  // [J]; kinetic: the largest between two stretches
   std::string failure;                                    // empty where every step converged
@@ -27,8 +27,8 @@ struct ScalingRow {
   bool failed() const { return !failure.empty(); }
   double seconds_per_step() const;  // median over the stretches; NaN where a step failed
   double ns_per_body() const { return 1e9 * seconds_per_step() / bodies; }
-  double iterations_mean() const { return static_cast<double>(iterations) / static_cast<double>(steps); }
-  double evaluations_mean() const { return static_cast<double>(evaluations) / static_cast<double>(steps); }
+  double iterations_mean() const { return static_cast<double>(run.iterations) / static_cast<double>(run.steps); }
+  double evaluations_mean() const { return static_cast<double>(run.evaluations) / static_cast<double>(run.steps); }
   double energy_change() const { return (last_energy - first_energy) / kinetic; }
 };
 

@@ -24,11 +24,12 @@ constexpr double kMuch = 3e-5;
 /// Rows that are looked at, of histories with so many more that it does not show in the time of a step.
 constexpr Index kSample = 128, kFewest = 8 * kSample;
 
-/// Whether much of history is noise, from its third difference on.
-bool is_noise(const Field<double, kHistory>& history) {
+/// Whether much of the last displacements, past(row, k) k steps ago, is noise from their third difference on.
+template <class Past>
+bool is_noise(Index rows, const Past& past) {
   double latest = 0, third = 0, fourth = 0;
-  for (Index row = 0; row < history.rows(); row += history.rows() / kSample) {
-    const double* const d = history.row(row);
+  for (Index row = 0; row < rows; row += rows / kSample) {
+    const double d[] = {past(row, 0), past(row, 1), past(row, 2), past(row, 3), past(row, 4)};
     const double now = d[0] - 3 * d[1] + 3 * d[2] - d[3], before = d[1] - 3 * d[2] + 3 * d[3] - d[4];
     latest += d[0] * d[0];
     third += now * now;
@@ -37,13 +38,22 @@ bool is_noise(const Field<double, kHistory>& history) {
   return fourth > kNoise * kNoise * third && third > kMuch * kMuch * latest;
 }
 
+template <class Past>
+Extrapolation extrapolation_of(Index rows, int terms, const Past& past) {
+  const bool cubic = terms == kHistory && rows >= kFewest && is_noise(rows, past);
+  return {cubic ? kCubic : polynomial_through(terms), terms};
+}
+
 }  // namespace
 
 const std::array<double, kHistory>& polynomial_through(int terms) { return kThrough[static_cast<std::size_t>(terms - 1)]; }
 
 Extrapolation extrapolation(const Field<double, kHistory>& history, int terms) {
-  const bool cubic = terms == kHistory && history.rows() >= kFewest && is_noise(history);
-  return {cubic ? kCubic : polynomial_through(terms), terms};
+  return extrapolation_of(history.rows(), terms, [&](Index row, int k) { return history(row, k); });
+}
+
+Extrapolation extrapolation_after(const Field<double>& latest, const Field<double, kHistory>& history, int terms) {
+  return extrapolation_of(history.rows(), terms, [&](Index row, int k) { return k == 0 ? latest(row) : history(row, k - 1); });
 }
 
 void extrapolate(const Extrapolation& guess, const Field<double, kHistory>& history, Slots rows, Field<double>& delta) {

@@ -28,6 +28,8 @@ struct Extrapolation {
 
 /// terms: how many rows of history are valid, at least one.
 Extrapolation extrapolation(const Field<double, kHistory>& history, int terms);
+/// The same once `latest` has joined the history.
+Extrapolation extrapolation_after(const Field<double>& latest, const Field<double, kHistory>& history, int terms);
 
 /// Rows of delta from those of history.
 void extrapolate(const Extrapolation& guess, const Field<double, kHistory>& history, Slots rows, Field<double>& delta);

@@ -39,7 +39,9 @@ class Stepper {
 
   /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
   /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
-  virtual StepReport step(State<double>& state, int& history, double time, double h) = 0;
+  /// another: a step of the same h follows before anything else is asked of the stepper or the state, which may then be left for that step
+  /// to complete. A step that fails leaves the state complete, as it was at its beginning.
+  virtual StepReport step(State<double>& state, int& history, double time, double h, bool another) = 0;
   /// Of effects, in the step taken last.
   virtual const EffectWork<double>& effect_work() const = 0;
 
@@ -49,8 +51,8 @@ class Stepper {
   virtual std::span<double> friction_forces() = 0;
   /// How contact point k ended the last step (EffectSweeps::contact).
   virtual double contact(Index k) const = 0;
-  /// What effects keep from step to step beside the state: part of a checkpoint.
-  virtual std::vector<std::span<double>> effect_memory() = 0;
+  /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
+  virtual std::vector<std::span<double>> memory() = 0;
 
   /// v = M(q)^-1 p for the positions of the last refresh or step; at the end of a step with effects, p with their impulses taken half
   /// at each end of it (kernels/effects/body_impulses.hpp). Returns that p.

@@ -67,7 +67,7 @@ class Bench {
       std::ranges::copy(start.velocities, v.flat().begin());
       stepper_->momentum_of(v, state_.p);
     }
-    for (int k = 0; k < kSteps && stepper_->step(state_, history_, k * options.step, options.step).ok(); ++k) {
+    for (int k = 0; k < kSteps && stepper_->step(state_, history_, k * options.step, options.step, false).ok(); ++k) {
     }
     impulse_.allocate(model.tree.shape.slots);
     rate_.allocate(model.tree.shape.velocities);

@@ -19,7 +19,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
     if (present) list.push_back(sweep);
   };
 
-  constexpr std::string_view first = "first", evaluation = "evaluation", once = "once a step", correction = "correction", last = "last";
+  constexpr std::string_view first = "first", evaluation = "evaluation", factor = "factor", correction = "correction", last = "last";
   add(true, {first, "momentum_target_map", "p, force", "momentum_target"});
   switch (options.guess) {
     case FirstGuess::extrapolation: add(true, {first, "first guess: extrapolation", "history", "delta"}); break;
@@ -52,9 +52,9 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   add(!effects.ball_springs.empty(), {evaluation, "ball_spring_map", "ball springs, q, motion", "momentum_target"});
   add(!one_pass, {evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual"});
   add(ties, {evaluation, "fold_mimics", "residual", "residual"});
-  add(newton, {once, "newton_factor_up", "inertia, screw, placement, motion, displacement", "gains"});
-  add(!newton, {once, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
-  add(ties, {once, "ties: a tree solve for each mimic", "gains", "ties"});
+  add(newton, {factor, "newton_factor_up", "inertia, screw, placement, motion, displacement", "gains"});
+  add(!newton, {factor, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
+  add(ties, {factor, "ties: a tree solve for each mimic", "gains", "ties"});
   add(!one_pass, {evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation"});
   add(one_pass, {evaluation, "innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation"});
   add(newton, {correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment"});

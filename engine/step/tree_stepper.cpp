@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "engine/step/convergence.hpp"
 #include "engine/step/diagnosis.hpp"
@@ -31,6 +32,12 @@ constexpr int kMostSoftCorrections = 40;
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
 constexpr double kSteepest = 0.5;
 
+/// What is left of HeldFactor::rate after each step with a factor of its own: where the motion has calmed down holding is tried again.
+constexpr double kRateForgotten = 0.95;
+
+/// Steps that a factor is held at most: it is also the measure by which residuals are judged.
+constexpr int kOldestFactor = 32;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -52,13 +59,13 @@ TreeStepper<kEffects>::TreeStepper(const Model& model, const Options& options, c
 }
 
 template <bool kEffects>
-StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h) {
+StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h, bool another) {
   StepReport report;
   time_ = time;
   effect_work_ = {};
   report.status = solve(state, history, h, report);
   if (report.ok()) {
-    finish(state, history, h);
+    finish(state, history, h, another);
     return report;
   }
   // The whole step failed: two halves, each split again if need be, from the state as it was.
@@ -85,7 +92,7 @@ bool TreeStepper<kEffects>::halves(State<double>& state, int& history, double h,
   for (int half = 0; half < 2; ++half) {
     report.status = solve(state, 0, h / 2, report);
     if (report.ok()) {
-      finish(state, history, h / 2);
+      finish(state, history, h / 2, false);
       report.substeps += 1;
     } else if (!halves(state, history, h / 2, depth + 1, report)) {
       return false;
@@ -144,12 +151,21 @@ double TreeStepper<kEffects>::contact([[maybe_unused]] Index k) const {
 }
 
 template <bool kEffects>
-std::vector<std::span<double>> TreeStepper<kEffects>::effect_memory() {
+std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
   if constexpr (kEffects) {
     const auto memory = effects_.memory();
     return {memory.begin(), memory.end()};
   }
-  return {};
+  if (!sweeps_.holds()) return {};
+  const auto factor = sweeps_.factor_memory();
+  return {{&held_.age, 1}, {&held_.rate, 1}, {&held_.residual, 1}, {&held_.floor, 1}, factor[0], factor[1], factor[2]};
+}
+
+/// Whether one correction with the factor there is, in the step that comes, is likely to be enough.
+template <bool kEffects>
+bool TreeStepper<kEffects>::holds_factor() const {
+  if (!sweeps_.holds() || !(held_.age > 0) || held_.age > kOldestFactor) return false;
+  return held_.residual * held_.rate * held_.age <= std::max(options_.tolerance, held_.floor);
 }
 
 /// Whether the state of an effect changed; work_.delta then says what the motion is to be.
@@ -163,7 +179,7 @@ bool TreeStepper<kEffects>::revise_effects(bool settled, bool one_by_one)
 }
 
 template <bool kEffects>
-StepStatus TreeStepper<kEffects>::solve(const State<double>& state, int history, double h, StepReport& report) {
+StepStatus TreeStepper<kEffects>::solve(State<double>& state, int history, double h, StepReport& report) {
   const StepStatus status = find_root(state, history, h, report);
   if (status != StepStatus::converged || !gains_energy(state, h)) return status;
   sweeps_.complete();
@@ -252,30 +268,50 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
 }
 
 template <bool kEffects>
-StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int history, double h, StepReport& report) {
-  Evaluated now;
+Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report) {
+  sweeps_.start(state.q);
+  fresh = history == 0 || !holds_factor();
+  if (to_end_ != 0) {
+    double work = 0;
+    const Extrapolation guess = extrapolation_after(work_.delta, state.history, history);
+    const Evaluated now = sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report, work);
+    state.pace(0, 1) = 0.5 * (force_work_ + work);
+    return now;
+  }
   if (!kEffects && options_.guess == FirstGuess::extrapolation && history > 0 && sweeps_.mimics().empty()) {
     // of each part of the tree when its turn comes
-    now = sweeps_.evaluate_from(state, extrapolation(state.history, history), h, report);
-  } else {
-    momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
-    first_guess(options_.guess, model_, state, history, h, sweeps_);
-    spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
-    if constexpr (kEffects) begin_effects(state, history, h);
-    now = sweeps_.evaluate(report);
+    return sweeps_.evaluate_from(state, extrapolation(state.history, history), h, fresh, report);
   }
+  momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
+  first_guess(options_.guess, model_, state, history, h, sweeps_);
+  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
+  if constexpr (kEffects) begin_effects(state, history, h);
+  return sweeps_.evaluate(report);
+}
+
+template <bool kEffects>
+StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, double h, StepReport& report) {
+  const int factors_before = report.factorisations;
+  bool fresh;  // the factor belongs to the current displacement
+  Evaluated now = first_evaluation(state, history, h, fresh, report);
   if (!now.usable()) {
     // no displacement at all is always within the range of log
     for (double& value : work_.delta.flat()) value = 0;
     now = sweeps_.evaluate(report);
+    fresh = true;
   }
+  const bool held = !fresh;  // until the first correction has been made, at the least
   double norm = now.norm;
+  held_.residual = std::sqrt(0.5 * norm / now.scale);
+  if (fresh) held_.rate *= kRateForgotten;
   enough_ = options_.reduction * options_.reduction * std::min(norm, 2 * kRoughGuess * kRoughGuess * now.scale);
-  bool fresh = true;  // the factor belongs to the current displacement
   StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
 
+  bool at_floor = false;
   const auto end = [&](StepStatus status) {
     const double relative = now.scale > 0 ? std::sqrt(0.5 * norm / now.scale) : std::sqrt(norm);
+    held_.age = status != StepStatus::converged ? 0 : held && report.factorisations == factors_before ? held_.age + 1 : 1;
+    held_.floor = at_floor ? relative : 0;
     if (status == StepStatus::converged) {
       momentum_energy_ = now.energy;
       report.residual = std::max(report.residual, relative);
@@ -318,7 +354,6 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
     return false;
   };
 
-  bool at_floor = false;
   for (int iteration = 0;; ++iteration) {
     if (!std::isfinite(norm) || !now.usable()) {
       sweeps_.complete();
@@ -342,11 +377,13 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
     if (revised(false)) continue;
     const bool slow = norm > kSlowProgress * kSlowProgress * before;
     const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.scale;
-    if ((slow && sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) ||
-        (close && !converged(now, norm, h) && sweeps_.at_rounding_floor(now, norm, fall(h), kBareRounding))) {
-      at_floor = true;
-      continue;
+    at_floor = (slow && sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) ||
+               (close && !converged(now, norm, h) && sweeps_.at_rounding_floor(now, norm, fall(h), kBareRounding));
+    if (held && iteration == 0) {
+      const double rate = std::min(1.0, std::sqrt(norm / before) / held_.age);
+      held_.rate = at_floor ? std::min(held_.rate, rate) : rate;  // rounding says no more than that it was not larger
     }
+    if (at_floor) continue;
     for (int cut = 0; !(norm < before) && cut < kMaxBacktracks; ++cut) {
       taken /= 2;
       norm = try_out(sweeps_.correct(-taken, report));
@@ -371,12 +408,17 @@ StepStatus TreeStepper<kEffects>::find_root(const State<double>& state, int hist
 
 /// The new state, from a displacement that solves the step.
 template <bool kEffects>
-void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h) {
+void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, bool another) {
   if constexpr (kEffects) {
     if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
   history = std::min(history + 1, kHistory);
+  if (!kEffects && another && sweeps_.can_go_on() && options_.guess == FirstGuess::extrapolation) {
+    state.pace(0, 0) = kinetic_;
+    to_end_ = h;
+    return;
+  }
   state.pace(0, 1) = 0.5 * (force_work_ + sweeps_.arrive(h, state));
   if constexpr (kEffects) {
     // an impact may take in one step what the next gives back
@@ -393,6 +435,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h)
 
 template <bool kEffects>
 void TreeStepper<kEffects>::forget() {
+  held_ = {};
   if constexpr (kEffects) effects_.forget();
 }
 

@@ -61,9 +61,8 @@ void down_and_up(const Tree& tree, Branches order, bool share, const Down& down,
   in_parts_up(tree.trunk, up);
 }
 
-/// Whether branches are to share rows. Motions of screws follow from delta; others are corrected from one evaluation to the next and need
-/// rows of their own. A step of a binary tree of 65,535 takes 18 lines of memory a body from beyond the second cache so, 27 with a row for
-/// every body, and 98 ns a body instead of 113.
+/// Whether branches are to share rows. Motions of screws follow from delta and placements from q; motions of other joints are corrected
+/// from one evaluation to the next and need rows of their own.
 bool shares_rows(const Tree& tree) {
   return !tree.branches.empty() && tree.trunk.end + kBranch <= tree.shape.slots / 2 && tree.runs.size() == 1 &&
          tree.runs.front().kind == JointKind::screw;
@@ -78,6 +77,8 @@ bool is_long_chain(const Tree& tree) {
   return true;
 }
 
+constexpr auto nothing = [](Slots) {};
+
 }  // namespace
 
 template <bool kEffects>
@@ -87,28 +88,28 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       options_(options),
       has_gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
       one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
+      holds_(!kEffects && one_pass_ && options.order == 2 && options.guess == FirstGuess::extrapolation),
       ties_(model.mimics, model.tree.shape.velocities),
       effects_(plan, model) {
   work_.allocate(model.tree.shape);
+  if (holds_) {
+    mass_gain_up_.allocate(model.tree.shape.velocities);
+    mass_gain_down_.allocate(model.tree.shape.velocities);
+    mass_joint_inverse_.allocate(model.tree.shape.blocks);
+  }
   is_long_chain_ = !kEffects && one_pass_ && options.order == 2 && is_long_chain(model.tree);
   shares_rows_ = !kEffects && one_pass_ && options.order == 2 && shares_rows(model.tree);
 }
 
-/// first(part) comes before the placements of each part of the tree, then(part) after its forces.
+/// Placements of some bodies, and gravity there.
 template <bool kEffects>
-template <class First, class Then>
-void TreeSweeps<kEffects>::refresh_and(const Field<double>& q, const First& first, const Then& then) {
-  down_and_up(
-      model_.tree, Branches::last_first, shares_rows_,
-      [&](Slots part) {
-        first(part);
-        placement_map(model_.tree, *constants_, q, part, work_.placement);
-        if (has_gravity_) gravity_field_down(model_.tree, work_.placement, gravity(), part, work_.field);
-      },
-      [&](Slots part) {
-        forces(part);
-        then(part);
-      });
+void TreeSweeps<kEffects>::place(const Field<double>& q, Slots part) {
+  placement_map(model_.tree, *constants_, q, part, work_.placement);
+  if (has_gravity_) gravity_field_down(model_.tree, work_.placement, gravity(), part, work_.field);
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::find_potentials([[maybe_unused]] const Field<double>& q) {
   if (has_gravity_) potential_ = gravity_potential(work_.field, work_.first_moment);
   if constexpr (kEffects) {
     effect_potential_ = effects_.refresh(work_.placement, q);
@@ -118,36 +119,61 @@ void TreeSweeps<kEffects>::refresh_and(const Field<double>& q, const First& firs
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::refresh(const Field<double>& q) {
-  const auto nothing = [](Slots) {};
-  refresh_and(q, nothing, nothing);
+  down_and_up(
+      model_.tree, Branches::last_first, false, [&](Slots part) { place(q, part); }, [&](Slots part) { forces(part); });
+  placed_ = true;
+  find_potentials(q);
+}
+
+/// Where branches share rows an evaluation leaves the placements of the last it met.
+template <bool kEffects>
+void TreeSweeps<kEffects>::place_all() {
+  if (placed_) return;
+  placement_map(model_.tree, *constants_, *q_, work_.placement);
+  placed_ = true;
+}
+
+/// Positions of some joints, and what depends on positions alone.
+template <bool kEffects>
+void TreeSweeps<kEffects>::arrive_down(Slots part, State<double>& state) {
+  if (ties_.empty()) advance(part, state);
+  place(state.q, part);
+}
+
+/// Forces on some joints and momenta there; seen: see seen_, of the step that ends. Returns the work of the forces along the displacement of the step that ends.
+template <bool kEffects>
+double TreeSweeps<kEffects>::arrive_up(Slots part, double h, bool seen, State<double>& state) {
+  forces(part);
+  if (seen) {
+    momentum_end_map(model_.tree, h, work_.increment, work_.force, part, state.p);
+  } else {
+    momentum_update_map(model_.tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, state.p);
+  }
+  const Slots rows = velocities(model_.tree, part);
+  double sum = 0;
+  for (Index row = rows.begin; row < rows.end; ++row) sum += work_.force(row) * state.history(row, 0);
+  return sum;
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::advance(Slots part, State<double>& state) {
+  remember(work_.delta, velocities(model_.tree, part), state.history);
+  advance_map(model_.tree, work_.motion, work_.delta, part, state.q);
 }
 
 template <bool kEffects>
 double TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
-  const Tree& tree = model_.tree;
-  const auto advance = [&](Slots part) {
-    remember(work_.delta, velocities(tree, part), state.history);
-    advance_map(tree, work_.motion, work_.delta, part, state.q);
-  };
   if (!ties_.empty()) {
-    advance(all_slots(tree));
+    advance(all_slots(model_.tree), state);
     for (const Mimic& mimic : mimics()) state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
   if (!seen_) complete();
   double work = 0;
-  refresh_and(
-      state.q,
-      [&](Slots part) {
-        if (ties_.empty()) advance(part);
-      },
-      [&](Slots part) {
-        if (seen_) {
-          momentum_end_map(tree, h, work_.increment, work_.force, part, state.p);
-        } else {
-          momentum_update_map(tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, state.p);
-        }
-        work += force_work(part);
-      });
+  down_and_up(
+      model_.tree, Branches::last_first, false, [&](Slots part) { arrive_down(part, state); },
+      [&](Slots part) { work += arrive_up(part, h, seen_, state); });
+  placed_ = true;
+  find_potentials(state.q);
   return work;
 }
 
@@ -181,10 +207,12 @@ void TreeSweeps<kEffects>::forces(Slots part) {
   }
 }
 
-/// motions(part) brings work_.motion up to date.
+/// motions(part) brings work_.motion up to date on the way down; before_up(part) comes first on the way up. first: of a solve, else of a
+/// correction.
 template <bool kEffects>
-template <class Motions>
-Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool fresh, const Motions& motions) {
+template <class Motions, class BeforeUp>
+Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions,
+                                                 const BeforeUp& before_up) {
   report.evaluations += 1;
   if (fresh) report.factorisations += 1;
   Evaluated now;
@@ -203,7 +231,9 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool fresh,
   if (!kEffects && one_pass_) {
     complete_ = !shares_rows_;
     seen_ = !fresh && (shares_rows_ || is_long_chain_);
+    placed_ = !shares_rows_;
     const auto up = [&](Slots part) {
+      before_up(part);
       now.norm += pass_part(part, fresh, NothingAdded{});
       if (seen_) {
         momentum_seen_map(model_.tree, *constants_, work_.displacement, work_.impulse, work_.innovation, part, work_.increment);
@@ -220,12 +250,13 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool fresh,
       });
     } else {
       // a correction begins where the pass before it ended: what that left is still in the cache
-      down_and_up(model_.tree, fresh ? Branches::last_first : Branches::first_first, shares_rows_, down, up);
+      down_and_up(model_.tree, first ? Branches::last_first : Branches::first_first, shares_rows_, down, up);
     }
     now.scale = now.energy;
     return now;
   }
   in_parts_down(all_slots(model_.tree), down);
+  before_up(all_slots(model_.tree));
   now.scale = now.energy;
   act(now);
   pass_up(now, fresh);
@@ -236,6 +267,7 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::complete() {
   if (complete_) return;
   const Slots all = all_slots(model_.tree);
+  place_all();
   motion_map(model_.tree, *constants_, work_.delta, work_.motion);
   displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
   momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
@@ -276,7 +308,7 @@ void TreeSweeps<kEffects>::factor() {
     effects_.with_added([&](const auto& added) {
       articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
     });
-    return tie_rates();
+    return tie_rates(gains());
   }
   effects_.with_added([&](const auto& added) {
     newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains(), added);
@@ -291,12 +323,12 @@ void TreeSweeps<kEffects>::factor() {
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::tie_rates() {
+void TreeSweeps<kEffects>::tie_rates(const Gains<double>& gains) {
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
-        impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), r, work_.bias, work_.innovation);
-        rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, x);
+        impulse_pass_up(model_.tree, *constants_, work_.placement, gains, r, work_.bias, work_.innovation);
+        rate_down(model_.tree, *constants_, work_.placement, gains, work_.innovation, work_.variation, x);
       },
       work_.increment);
 }
@@ -363,25 +395,58 @@ void TreeSweeps<kEffects>::pass_down() {
   if (!ties_.empty()) ties_.complete(work_.increment);
 }
 
+/// Placements of some bodies where the rows hold another branch's.
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::evaluate(StepReport& report) {
-  return evaluate_motions(report, true, [&](Slots part) { motion_map(model_.tree, *constants_, work_.delta, part, work_.motion); });
+void TreeSweeps<kEffects>::place_again(Slots part) {
+  if (part.branch > 0) placement_map(model_.tree, *constants_, *q_, part, work_.placement);
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::evaluate_from(const State<double>& state, const Extrapolation& guess, double h, StepReport& report) {
-  return evaluate_motions(report, true, [&](Slots part) {
-    momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target);
+Evaluated TreeSweeps<kEffects>::evaluate(StepReport& report) {
+  const auto motions = [&](Slots part) {
+    place_again(part);
+    motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
+  };
+  return evaluate_motions(report, true, true, motions, nothing);
+}
+
+template <bool kEffects>
+Evaluated TreeSweeps<kEffects>::evaluate_from(const State<double>& state, const Extrapolation& guess, double h, bool fresh,
+                                                StepReport& report) {
+  const auto motions = [&](Slots part) {
+    place_again(part);
     extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
-  });
+  };
+  const auto target = [&](Slots part) { momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target); };
+  return evaluate_motions(report, true, fresh, motions, target);
+}
+
+template <bool kEffects>
+Evaluated TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h,
+                                                    bool fresh, StepReport& report, double& work) {
+  work = 0;
+  const auto motions = [&](Slots part) {
+    arrive_down(part, state);
+    extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
+    motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
+  };
+  const auto arrival = [&](Slots part) {
+    work += arrive_up(part, h_before, true, state);
+    momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target);
+  };
+  const Evaluated now = evaluate_motions(report, true, fresh, motions, arrival);
+  find_potentials(state.q);
+  return now;
 }
 
 template <bool kEffects>
 Evaluated TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
-  return evaluate_motions(report, false, [&](Slots part) {
+  const auto motions = [&](Slots part) {
+    place_again(part);
     correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
-  });
+  };
+  return evaluate_motions(report, false, false, motions, nothing);
 }
 
 template <bool kEffects>
@@ -392,12 +457,14 @@ Evaluated TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
     std::swap(work_.increment, work_.applied);
     return correct(1, report);
   }
-  return evaluate_motions(report, false, [&](Slots part) {
-    if (part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);  // another branch's are there
+  const auto motions = [&](Slots part) {
+    place_again(part);
+    if (part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
     increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, part, work_.variation,
                    work_.applied);
     correct_motion_map(model_.tree, *constants_, work_.applied, 1.0, part, work_.delta, work_.motion);
-  });
+  };
+  return evaluate_motions(report, false, false, motions, nothing);
 }
 
 template <bool kEffects>
@@ -423,16 +490,17 @@ bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, 
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::factor_mass() {
+  place_all();
   effects_.with_rotors([&](const auto& rotors) {
-    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), rotors);
+    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), rotors);
   });
-  tie_rates();
+  tie_rates(mass_gains());
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v) {
-  impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), p, work_.bias, work_.innovation);
-  rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, v);
+  impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, work_.bias, work_.innovation);
+  rate_down(model_.tree, *constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, v);
   if (!ties_.empty()) ties_.complete(v);
 }
 
@@ -444,6 +512,7 @@ void TreeSweeps<kEffects>::velocity_of(const Field<double>& p, Field<double>& v)
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::momentum_of(const Field<double>& v, Field<double>& p) {
+  place_all();
   velocity_down(model_.tree, *constants_, work_.placement, v, work_.twist);
   momentum_of_map(model_.tree, *constants_, work_.twist, work_.impulse);
   impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, p);

@@ -12,6 +12,7 @@
 // down and up before the next. What an evaluation finds where a body turned too far is not usable.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -54,6 +55,8 @@ class TreeSweeps {
   /// The same at the end of a step of h, whose displacement joins the history: positions, momenta. Returns the work of the forces there
   /// along the displacement [J].
   double arrive(double h, State<double>& state);
+  /// Whether the end of a step whose last evaluation this was and the first evaluation of the next can go over each branch together.
+  bool can_go_on() const { return seen_; }
   /// Work of the forces of potentials and of those applied along delta, of some bodies [J].
   double force_work(Slots part) const;
   /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
@@ -63,13 +66,18 @@ class TreeSweeps {
   void apply(std::span<const double> force);
   void use(const BodyConstants<double>& constants) { constants_ = &constants; }
 
-  /// Before the evaluations of a step. known: the step before is one of these sweeps; scale: see Evaluated.
+  /// Before all else of a step from these positions, which must stay where they are until it is over.
+  void start(const Field<double>& q) { q_ = &q; }
+  /// Before the evaluations of a step with effects. known: the step before is one of these sweeps; scale: see Evaluated.
   void begin(bool known, double scale);
   /// With a fresh factor.
   Evaluated evaluate(StepReport& report);
-  /// The same from a guess of delta, momentum_target and all.
-  Evaluated evaluate_from(const State<double>& state, const Extrapolation& guess, double h, StepReport& report);
-  /// Motions, displacements and impulses of all bodies: where branches share rows an evaluation leaves those of the last it met.
+  /// The same from a guess of delta, momentum_target and all. fresh: with a fresh factor, else with the one there is; see holds.
+  Evaluated evaluate_from(const State<double>& state, const Extrapolation& guess, double h, bool fresh, StepReport& report);
+  /// arrive at the end of the step before, of h_before, and evaluate_from there, both while a branch is in the cache; see can_go_on.
+  Evaluated arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h, bool fresh,
+                                StepReport& report, double& work);
+  /// Placements, motions, displacements and impulses of all bodies: where branches share rows an evaluation leaves those of the last it met.
   void complete();
   /// A fresh factor for the evaluation made last.
   void factor_again(Evaluated& now, StepReport& report);
@@ -88,6 +96,13 @@ class TreeSweeps {
   /// beside the motion, or beside what gravity alone would do to it where all is at rest (fall).
   bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons);
 
+  /// Whether the factor outlasts a step: reading velocities then has one of its own.
+  bool holds() const { return holds_; }
+  /// The factor: part of a checkpoint where it outlasts a step.
+  std::array<std::span<double>, 3> factor_memory() {
+    return {work_.gain_up.flat(), work_.gain_down.flat(), work_.joint_inverse.flat()};
+  }
+
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
   void velocity_of(const Field<double>& p, Field<double>& v);
   void apply_mass_inverse(const Field<double>& p, Field<double>& v);
@@ -95,10 +110,15 @@ class TreeSweeps {
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
 
  private:
-  template <class First, class Then>
-  void refresh_and(const Field<double>& q, const First& first, const Then& then);
-  template <class Motions>
-  Evaluated evaluate_motions(StepReport& report, bool fresh, const Motions& motions);
+  void place(const Field<double>& q, Slots part);
+  void place_all();
+  void place_again(Slots part);
+  void find_potentials(const Field<double>& q);
+  void advance(Slots part, State<double>& state);
+  void arrive_down(Slots part, State<double>& state);
+  double arrive_up(Slots part, double h, bool seen, State<double>& state);
+  template <class Motions, class BeforeUp>
+  Evaluated evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions, const BeforeUp& before_up);
   template <class Added>
   double pass_part(Slots part, bool fresh, const Added& added);
   void act(Evaluated& now);
@@ -106,20 +126,23 @@ class TreeSweeps {
   void pass_up(Evaluated& now, bool fresh);
   void factor();
   void factor_mass();
-  void tie_rates();
+  void tie_rates(const Gains<double>& gains);
   double pass_residual();
   void pass_down();
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+  Gains<double> mass_gains() { return holds_ ? Gains<double>{mass_gain_up_, mass_gain_down_, mass_joint_inverse_} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
 
   const Model& model_;
   const BodyConstants<double>* constants_;
   Options options_;
   bool has_gravity_;
-  bool one_pass_;
+  bool one_pass_, holds_;
   bool shares_rows_ = false;  // branches do, see Slots
   bool is_long_chain_ = false;
   bool complete_ = true;      // see complete()
+  bool placed_ = true;        // placements of all bodies are there; so between steps
+  const Field<double>* q_ = nullptr;  // see start
   bool seen_ = false;         // increment holds the momenta of the evaluation made last, seen from the end of the step
   double potential_ = 0, effect_potential_ = 0;
   double effect_scale_ = 0;
@@ -130,6 +153,8 @@ class TreeSweeps {
   MimicTies<double> ties_;
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
   Field<double> read_;  // see read_velocity
+  Field<double, 6> mass_gain_up_, mass_gain_down_;  // of the mass matrix, where the factor of the steps is to stay
+  Field<double> mass_joint_inverse_;
 };
 
 }  // namespace linden

@@ -51,6 +51,21 @@ TEST_CASE("of histories that are noise a cubic near them is taken, which multipl
   CHECK(std::sqrt(sum / kRows) == Approx(4.92e-3).epsilon(0.1));
 }
 
+TEST_CASE("the choice is the same before the latest displacement has joined the history") {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> noise(0, 1e-3);
+  for (const double amount : {0.0, 1.0}) {
+    Field<double, kHistory> history = history_of([&](Index i, int t) { return 1 + 0.1 * t + 1e-4 * i + amount * noise(random); });
+    Field<double> latest;
+    latest.allocate(kRows);
+    for (Index i = 0; i < kRows; ++i) latest(i) = 1 + 1e-4 * i + amount * noise(random);
+    const Extrapolation before = extrapolation_after(latest, history, kHistory);
+    remember(latest, {0, kRows}, history);
+    CHECK(before.shares == extrapolation(history, kHistory).shares);
+    CHECK((before.shares == polynomial_through(kHistory)) == (amount == 0));
+  }
+}
+
 TEST_CASE("a displacement that is remembered comes first, and the oldest is forgotten") {
   const auto f = [](Index i, int t) { return 10 * i + t; };
   Field<double, kHistory> history = history_of(f);

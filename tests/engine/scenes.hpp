@@ -43,10 +43,8 @@ inline void random_start(Simulation& simulation, std::uint64_t seed, double spre
 
 /// Steps, and fails the test where a step fails.
 inline void run(Simulation& simulation, int steps) {
-  for (int k = 0; k < steps; ++k) {
-    const StepReport report = simulation.step();
-    if (!report.ok()) FAIL(simulation.describe(report));
-  }
+  const StepsReport report = simulation.run(steps);
+  if (!report.ok()) FAIL(simulation.describe(report.last));
 }
 
 /// Largest difference between two states of the same model, positions alone.
