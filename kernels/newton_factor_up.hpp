@@ -114,7 +114,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
     const auto has_children = at_bodies(bodies, tree.is_leaf, i) < BodyPack(0.5);
     for (int line = 0; line < 6; ++line) {
       BodyPack left[6];
-      turning::rows_to_lanes<6>([&](int l) LINDEN_INLINE_LAMBDA { return articulated.row(tree.waiting(i + l)) + 8 * line; }, left);
+      turning::rows_to_lanes<6>([&](int l) LINDEN_INLINE_LAMBDA { return articulated.row(tree.waiting_row(slots, i + l)) + 8 * line; }, left);
       for (int k = 0; k < 6; ++k) {
         BodyPack& number = A[place(ByColumns, line, k)];
         number = select(has_children, number + left[k], number);
@@ -136,7 +136,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
   }
   for (Index l = kBodies - 1; l >= 0; --l) {
     const double* const from = passed + l * kRowNumbers;
-    double* const kept = articulated.row(tree.waiting(tree.parent(i + l)));
+    double* const kept = articulated.row(tree.waiting_row(slots, tree.parent(i + l)));
     const bool first = tree.is_last_child(i + l) != 0;
     for (int k = 0; k < 48; k += 8) store_row8(kept + k, first ? load_row8(from + k) : load_row8(from + k) + load_row8(kept + k));
   }
@@ -152,7 +152,7 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
   const auto left_for = [&](Index i) LINDEN_INLINE_LAMBDA {
     Rows6 rows{};
     if (tree.is_leaf(i) != 0) return rows;
-    for (int k = 0; k < 6; ++k) rows.r[k] = load_row8(articulated.row(tree.waiting(i)) + 8 * k);
+    for (int k = 0; k < 6; ++k) rows.r[k] = load_row8(articulated.row(tree.waiting_row(slots, i)) + 8 * k);
     return rows;
   };
   const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
@@ -190,7 +190,7 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
         waiting = passed;
         continue;
       }
-      double* const kept = articulated.row(tree.waiting(parent));
+      double* const kept = articulated.row(tree.waiting_row(slots, parent));
       for (int k = 0; k < 6; ++k) store_row8(kept + 8 * k, first ? passed.r[k] : passed.r[k] + load_row8(kept + 8 * k));
       if (i > part.begin) waiting = left_for(i - 1);
     }

@@ -41,6 +41,17 @@ struct Workspace {
   LINDEN_FIELDS(LINDEN_WORKSPACE_FIELDS)
 };
 
+#define LINDEN_FACTOR_FIELDS(FIELD)                                    \
+  FIELD(Scalar, gain_up, 6, velocities, "as in Workspace")             \
+  FIELD(Scalar, gain_down, 6, velocities, "likewise")                  \
+  FIELD(Scalar, joint_inverse, 1, blocks, "likewise")
+
+/// Factor of the mass matrix, where that of the steps is to stay when velocities are read.
+template <class Scalar>
+struct MassFactor {
+  LINDEN_FIELDS(LINDEN_FACTOR_FIELDS)
+};
+
 #define LINDEN_KEPT_FIELDS(FIELD)                                                  \
   FIELD(Scalar, motion, 7, slots, "of the accepted displacement, as in Workspace") \
   FIELD(Scalar, displacement, 7, slots, "likewise")                                \

@@ -1,6 +1,7 @@
 #include "engine/program/scaling_command.hpp"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -79,8 +80,9 @@ class Measurement {
     row_.solver = solver;
     row_.bodies = tree.bodies();
     row_.dofs = model->degrees_of_freedom();
+    row_.threads = std::min<int>(tree.most_threads(), oneapi::tbb::this_task_arena::max_concurrency());
     row_.bytes = bytes_for<State<double>>(tree.shape) + bytes_for<Workspace<double>>(tree.shape) +
-                 bytes_for<BodyConstants<double>>(tree.shape) + bytes_for<Tree>(tree.shape);
+                 (solver == Solver::newton ? bytes_for<MassFactor<double>>(tree.shape) : 0) + bytes_for<BodyConstants<double>>(tree.shape) + bytes_for<Tree>(tree.shape);
     const InitialState state = random_state(*model, arguments.seed, arguments.spread);
     simulation_.set_positions(state.positions);
     simulation_.set_velocities(state.velocities);

@@ -40,7 +40,8 @@ std::string four_digits(double value) {
 }
 
 std::vector<std::string> cells(const ScalingRow& row) {
-  std::vector<std::string> result{std::string(name(row.solver)), grouped(row.bodies), grouped(row.dofs), grouped(row.run.steps)};
+  std::vector<std::string> result{std::string(name(row.solver)), grouped(row.bodies), grouped(row.dofs), fmt::format("{}", row.threads),
+                                  grouped(row.run.steps)};
   if (row.failed()) {
     result.insert(result.end(), {"failed", "-", "-", "-", "-", "-"});
   } else {
@@ -94,6 +95,7 @@ std::string scaling_summary(const ScalingArguments& arguments, const ScalingFigu
   Table table({{"solver", left},
                {"bodies", right},
                {"DOFs", right},
+               {"threads", right},
                {"steps", right},
                {"\u00b5s/step", right},
                {"ns/body", right},
@@ -134,6 +136,7 @@ nlohmann::ordered_json scaling_json(const ScalingArguments& arguments, const Sca
                     {"model", row.model},
                     {"bodies", row.bodies},
                     {"dofs", row.dofs},
+                    {"threads", row.threads},
                     {"steps", row.run.steps},
                     {"seconds_per_step", if_any(ran, row.seconds_per_step())},
                     {"seconds_per_step_least", if_any(ran, ran ? std::ranges::min(row.seconds) : 0)},

@@ -18,6 +18,7 @@ struct ScalingRow {
   Solver solver{};
   std::string model;
   Index bodies = 0, dofs = 0;
+  int threads = 1;  // that step it
   std::size_t bytes = 0;  // state, workspace, constants and tree
   StepsReport run;
   std::vector<double> seconds;                            // per step, of each stretch

@@ -272,10 +272,9 @@ Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int hist
   sweeps_.start(state.q);
   fresh = history == 0 || !holds_factor();
   if (to_end_ != 0) {
-    double work = 0;
     const Extrapolation guess = extrapolation_after(work_.delta, state.history, history);
-    const Evaluated now = sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report, work);
-    state.pace(0, 1) = 0.5 * (force_work_ + work);
+    const Evaluated now = sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report);
+    state.pace(0, 1) = 0.5 * (force_work_ + now.work);
     return now;
   }
   if (!kEffects && options_.guess == FirstGuess::extrapolation && history > 0 && sweeps_.mimics().empty()) {

@@ -1,6 +1,10 @@
 #include "engine/step/tree_sweeps.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -39,28 +43,6 @@ void in_parts_up(Slots slots, const Action& action) {
   for (Index end = slots.end; end > slots.begin; end -= kPart) action(slots.part(std::max(slots.begin, end - kPart), end));
 }
 
-enum class Branches { last_first, first_first };
-
-/// All of a tree down and up again, each branch both ways while it is in the cache. Where the last comes first, bodies of the trunk meet
-/// their children in the order of a sweep over the whole tree, which Tree::is_last_child and Tree::waiting ask for. share: branches take
-/// the same rows of arrays, see Slots.
-template <class Down, class Up>
-void down_and_up(const Tree& tree, Branches order, bool share, const Down& down, const Up& up) {
-  if (tree.trunk.begin == tree.trunk.end) down(tree.trunk);  // what starts at the world
-  in_parts_down(tree.trunk, down);
-  const auto both_ways = [&](Slots slots) {
-    if (share) slots.branch = slots.begin, slots.back = slots.begin - tree.trunk.end;
-    in_parts_down(slots, down);
-    in_parts_up(slots, up);
-  };
-  if (order == Branches::first_first) {
-    std::ranges::for_each(tree.branches, both_ways);
-  } else {
-    std::for_each(tree.branches.rbegin(), tree.branches.rend(), both_ways);
-  }
-  in_parts_up(tree.trunk, up);
-}
-
 /// Whether branches are to share rows. Motions of screws follow from delta and placements from q; motions of other joints are corrected
 /// from one evaluation to the next and need rows of their own.
 bool shares_rows(const Tree& tree) {
@@ -77,7 +59,7 @@ bool is_long_chain(const Tree& tree) {
   return true;
 }
 
-constexpr auto nothing = [](Slots) {};
+constexpr auto nothing = [](Slots, Evaluated&) {};
 
 }  // namespace
 
@@ -92,13 +74,48 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       ties_(model.mimics, model.tree.shape.velocities),
       effects_(plan, model) {
   work_.allocate(model.tree.shape);
-  if (holds_) {
-    mass_gain_up_.allocate(model.tree.shape.velocities);
-    mass_gain_down_.allocate(model.tree.shape.velocities);
-    mass_joint_inverse_.allocate(model.tree.shape.blocks);
-  }
+  if (holds_) mass_.allocate(model.tree.shape);
   is_long_chain_ = !kEffects && one_pass_ && options.order == 2 && is_long_chain(model.tree);
   shares_rows_ = !kEffects && one_pass_ && options.order == 2 && shares_rows(model.tree);
+  of_branches_.resize(model.tree.branches.size());
+}
+
+/// All of a tree down and up again, each branch both ways while it is in the cache: down(part, sum), up(part, sum). Where the last comes
+/// first, bodies of the trunk meet their children in the order of a sweep over the whole tree, which Tree::is_last_child asks for where
+/// branches are not apart. share: branches take the same rows of arrays, see Slots.
+template <bool kEffects>
+template <class Down, class Up>
+Evaluated TreeSweeps<kEffects>::down_and_up(bool last_first, bool share, const Down& down, const Up& up) {
+  const Tree& tree = model_.tree;
+  Evaluated sum;
+  if (tree.trunk.begin == tree.trunk.end) down(tree.trunk, sum);  // what starts at the world
+  in_parts_down(tree.trunk, [&](Slots part) { down(part, sum); });
+  const std::size_t count = tree.branches.size();
+  const auto both_ways = [&](std::size_t number, Index thread) {
+    Slots slots = tree.branches[last_first ? count - 1 - number : number];
+    slots.branch = slots.begin;
+    if (share) slots.back = slots.begin - tree.trunk.end - thread * kBranch;
+    slots.waiting_more = thread * tree.waiting_rows;
+    Evaluated own;
+    in_parts_down(slots, [&](Slots part) { down(part, own); });
+    in_parts_up(slots, [&](Slots part) { up(part, own); });
+    of_branches_[number] = own;
+  };
+  const Index most = tree.most_threads(), threads = most == 1 ? 1 : std::min<Index>(most, oneapi::tbb::this_task_arena::max_concurrency());
+  std::atomic<std::size_t> next = 0;
+  const auto go_through = [&](Index thread) {
+    for (std::size_t number; (number = next.fetch_add(1, std::memory_order_relaxed)) < count;) both_ways(number, thread);
+  };
+  if (threads == 1) {
+    go_through(0);
+  } else {
+    // isolated: who waits here must not begin with another instance, which may need this very memory
+    oneapi::tbb::this_task_arena::isolate(
+        [&] { oneapi::tbb::parallel_for(Index{0}, threads, go_through, oneapi::tbb::simple_partitioner{}); });
+  }
+  for (const Evaluated& own : of_branches_) sum.add(own);  // in this order whoever found them
+  in_parts_up(tree.trunk, [&](Slots part) { up(part, sum); });
+  return sum;
 }
 
 /// Placements of some bodies, and gravity there.
@@ -120,7 +137,7 @@ void TreeSweeps<kEffects>::find_potentials([[maybe_unused]] const Field<double>&
 template <bool kEffects>
 void TreeSweeps<kEffects>::refresh(const Field<double>& q) {
   down_and_up(
-      model_.tree, Branches::last_first, false, [&](Slots part) { place(q, part); }, [&](Slots part) { forces(part); });
+      true, false, [&](Slots part, Evaluated&) { place(q, part); }, [&](Slots part, Evaluated&) { forces(part); });
   placed_ = true;
   find_potentials(q);
 }
@@ -168,13 +185,12 @@ double TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
     for (const Mimic& mimic : mimics()) state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
   if (!seen_) complete();
-  double work = 0;
-  down_and_up(
-      model_.tree, Branches::last_first, false, [&](Slots part) { arrive_down(part, state); },
-      [&](Slots part) { work += arrive_up(part, h, seen_, state); });
+  const Evaluated end = down_and_up(
+      true, false, [&](Slots part, Evaluated&) { arrive_down(part, state); },
+      [&](Slots part, Evaluated& sum) { sum.work += arrive_up(part, h, seen_, state); });
   placed_ = true;
   find_potentials(state.q);
-  return work;
+  return end.work;
 }
 
 template <bool kEffects>
@@ -207,7 +223,7 @@ void TreeSweeps<kEffects>::forces(Slots part) {
   }
 }
 
-/// motions(part) brings work_.motion up to date on the way down; before_up(part) comes first on the way up. first: of a solve, else of a
+/// motions(part) brings work_.motion up to date on the way down; before_up(part, sum) comes first on the way up. first: of a solve, else of a
 /// correction.
 template <bool kEffects>
 template <class Motions, class BeforeUp>
@@ -216,25 +232,25 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first,
   report.evaluations += 1;
   if (fresh) report.factorisations += 1;
   Evaluated now;
-  const auto move = [&](Slots part) {
+  const auto move = [&](Slots part, Evaluated& sum) {
     motions(part);
     const double least = displacement_down(model_.tree, work_.placement, work_.motion, part, work_.displacement);
-    now.least_w = std::min(now.least_w, least);
+    sum.least_w = std::min(sum.least_w, least);
   };
-  const auto momenta = [&](Slots part) {
-    now.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
+  const auto momenta = [&](Slots part, Evaluated& sum) {
+    sum.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
   };
-  const auto down = [&](Slots part) {
-    move(part);
-    momenta(part);
+  const auto down = [&](Slots part, Evaluated& sum) {
+    move(part, sum);
+    momenta(part, sum);
   };
   if (!kEffects && one_pass_) {
     complete_ = !shares_rows_;
     seen_ = !fresh && (shares_rows_ || is_long_chain_);
     placed_ = !shares_rows_;
-    const auto up = [&](Slots part) {
-      before_up(part);
-      now.norm += pass_part(part, fresh, NothingAdded{});
+    const auto up = [&](Slots part, Evaluated& sum) {
+      before_up(part, sum);
+      sum.norm += pass_part(part, fresh, NothingAdded{});
       if (seen_) {
         momentum_seen_map(model_.tree, *constants_, work_.displacement, work_.impulse, work_.innovation, part, work_.increment);
       }
@@ -243,20 +259,20 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first,
       // momenta on the way up, where a factor reads inertias and displacements too; of a part its parent's, to which it adds, and not its
       // last, which it had from the part before
       const Slots all = all_slots(model_.tree);
-      in_parts_down(all, move);
+      in_parts_down(all, [&](Slots part) { move(part, now); });
       in_parts_up(all, [&](Slots part) {
-        momenta({std::max(all.begin, part.begin - 1), part.end == all.end ? part.end : part.end - 1});
-        up(part);
+        momenta({std::max(all.begin, part.begin - 1), part.end == all.end ? part.end : part.end - 1}, now);
+        up(part, now);
       });
     } else {
       // a correction begins where the pass before it ended: what that left is still in the cache
-      down_and_up(model_.tree, first ? Branches::last_first : Branches::first_first, shares_rows_, down, up);
+      now = down_and_up(first, shares_rows_, down, up);
     }
     now.scale = now.energy;
     return now;
   }
-  in_parts_down(all_slots(model_.tree), down);
-  before_up(all_slots(model_.tree));
+  in_parts_down(all_slots(model_.tree), [&](Slots part) { down(part, now); });
+  before_up(all_slots(model_.tree), now);
   now.scale = now.energy;
   act(now);
   pass_up(now, fresh);
@@ -398,7 +414,7 @@ void TreeSweeps<kEffects>::pass_down() {
 /// Placements of some bodies where the rows hold another branch's.
 template <bool kEffects>
 void TreeSweeps<kEffects>::place_again(Slots part) {
-  if (part.branch > 0) placement_map(model_.tree, *constants_, *q_, part, work_.placement);
+  if (shares_rows_ && part.branch > 0) placement_map(model_.tree, *constants_, *q_, part, work_.placement);
 }
 
 template <bool kEffects>
@@ -418,21 +434,20 @@ Evaluated TreeSweeps<kEffects>::evaluate_from(const State<double>& state, const 
     extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  const auto target = [&](Slots part) { momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target); };
+  const auto target = [&](Slots part, Evaluated&) { momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target); };
   return evaluate_motions(report, true, fresh, motions, target);
 }
 
 template <bool kEffects>
 Evaluated TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h,
-                                                    bool fresh, StepReport& report, double& work) {
-  work = 0;
+                                                    bool fresh, StepReport& report) {
   const auto motions = [&](Slots part) {
     arrive_down(part, state);
     extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  const auto arrival = [&](Slots part) {
-    work += arrive_up(part, h_before, true, state);
+  const auto arrival = [&](Slots part, Evaluated& sum) {
+    sum.work += arrive_up(part, h_before, true, state);
     momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target);
   };
   const Evaluated now = evaluate_motions(report, true, fresh, motions, arrival);
@@ -459,7 +474,7 @@ Evaluated TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
   }
   const auto motions = [&](Slots part) {
     place_again(part);
-    if (part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
+    if (shares_rows_ && part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
     increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, part, work_.variation,
                    work_.applied);
     correct_motion_map(model_.tree, *constants_, work_.applied, 1.0, part, work_.delta, work_.motion);

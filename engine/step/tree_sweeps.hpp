@@ -9,9 +9,10 @@
 //
 // One upward sweep finds residual and norm where no joint is tied to another and nobody asks for |r|; else residual, ties and solve go one
 // by one. Effects, where there are any, act in each evaluation and factor; where there are none, each branch of the tree is gone through
-// down and up before the next. What an evaluation finds where a body turned too far is not usable.
+// down and up before the next, or several by as many threads. Sums are those of one branch after the other however many there are. What an evaluation finds where a body turned too far is not usable.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <span>
@@ -33,7 +34,15 @@ struct Evaluated {
   double plain = 0;    // |h r|^2
   double norm = 0;     // squared energy norm of the residual
   double scale = 0;    // what a residual is compared with: energy, with effects also what gravity gives in a step
+  double work = 0;     // of the forces at its beginning along the displacement of the step that ended there, if one did [J]
   bool usable() const { return least_w > 0 && std::isfinite(norm) && std::isfinite(plain) && std::isfinite(energy); }
+  /// What another part of the tree adds.
+  void add(const Evaluated& part) {
+    least_w = std::min(least_w, part.least_w);
+    energy += part.energy;
+    norm += part.norm;
+    work += part.work;
+  }
 };
 
 /// kEffects: with those of the plan, beside gravity.
@@ -76,7 +85,7 @@ class TreeSweeps {
   Evaluated evaluate_from(const State<double>& state, const Extrapolation& guess, double h, bool fresh, StepReport& report);
   /// arrive at the end of the step before, of h_before, and evaluate_from there, both while a branch is in the cache; see can_go_on.
   Evaluated arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h, bool fresh,
-                                StepReport& report, double& work);
+                                StepReport& report);
   /// Placements, motions, displacements and impulses of all bodies: where branches share rows an evaluation leaves those of the last it met.
   void complete();
   /// A fresh factor for the evaluation made last.
@@ -117,6 +126,8 @@ class TreeSweeps {
   void advance(Slots part, State<double>& state);
   void arrive_down(Slots part, State<double>& state);
   double arrive_up(Slots part, double h, bool seen, State<double>& state);
+  template <class Down, class Up>
+  Evaluated down_and_up(bool last_first, bool share, const Down& down, const Up& up);
   template <class Motions, class BeforeUp>
   Evaluated evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions, const BeforeUp& before_up);
   template <class Added>
@@ -130,7 +141,7 @@ class TreeSweeps {
   double pass_residual();
   void pass_down();
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
-  Gains<double> mass_gains() { return holds_ ? Gains<double>{mass_gain_up_, mass_gain_down_, mass_joint_inverse_} : gains(); }
+  Gains<double> mass_gains() { return holds_ ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
 
   const Model& model_;
@@ -139,6 +150,7 @@ class TreeSweeps {
   bool has_gravity_;
   bool one_pass_, holds_;
   bool shares_rows_ = false;  // branches do, see Slots
+  std::vector<Evaluated> of_branches_;
   bool is_long_chain_ = false;
   bool complete_ = true;      // see complete()
   bool placed_ = true;        // placements of all bodies are there; so between steps
@@ -153,8 +165,7 @@ class TreeSweeps {
   MimicTies<double> ties_;
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
   Field<double> read_;  // see read_velocity
-  Field<double, 6> mass_gain_up_, mass_gain_down_;  // of the mass matrix, where the factor of the steps is to stay
-  Field<double> mass_joint_inverse_;
+  MassFactor<double> mass_;  // empty where nothing is held
 };
 
 }  // namespace linden

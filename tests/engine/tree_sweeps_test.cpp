@@ -2,8 +2,11 @@
 #include "engine/step/tree_sweeps.hpp"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "kernels/joints.hpp"
 #include "tests/engine/scenes.hpp"
@@ -75,6 +78,41 @@ TEST_CASE("branches that share rows leave what a step needs that takes no correc
     CHECK(report.status == other.status);
     CHECK(report.slot == other.slot);
     CHECK(distance(branches.positions(), before) == 0);
+  }
+}
+
+TEST_CASE("the number of threads does not change a bit") {
+  const oneapi::tbb::global_control allowed(oneapi::tbb::global_control::max_allowed_parallelism, 8);
+  for (const Model& model : {balanced_tree(20'000), balanced_tree(9000, 7), random_tree({.bodies = 8000, .seed = 1})}) {
+    INFO(model.names.model);
+    REQUIRE(model.tree.branches_apart);
+    struct Ran {
+      std::unique_ptr<Simulation> simulation;
+      StepsReport report;
+    };
+    const auto ran_by = [&](int threads) {
+      oneapi::tbb::task_arena arena(threads);
+      Ran ran;
+      arena.execute([&] {
+        ran.simulation = std::make_unique<Simulation>(model, Options{.step = 1e-3});
+        random_start(*ran.simulation, 3, 0.3);
+        ran.report = ran.simulation->run(12);
+        ran.simulation->energy();
+        ran.report.add(ran.simulation->step());
+      });
+      REQUIRE(ran.report.ok());
+      return ran;
+    };
+    const Ran expected = ran_by(1);
+    for (const int threads : {2, 3, 8}) {
+      CAPTURE(threads);
+      const Ran found = ran_by(threads);
+      CHECK(std::ranges::equal(found.simulation->positions(), expected.simulation->positions()));
+      CHECK(std::ranges::equal(found.simulation->momenta(), expected.simulation->momenta()));
+      CHECK(found.simulation->energy().total() == expected.simulation->energy().total());
+      CHECK(found.report.largest_residual == expected.report.largest_residual);
+      CHECK(found.report.evaluations == expected.report.evaluations);
+    }
   }
 }
 

@@ -95,6 +95,55 @@ TEST_CASE("no two bodies whose children have passed something share a row while 
   }
 }
 
+TEST_CASE("children of one body of the trunk are in one branch where they fit there, and trees know where they do") {
+  for (const Model& model : large_trees()) {
+    const Tree& tree = model.tree;
+    INFO(model.names.model);
+    std::vector<std::set<Index>> below(static_cast<std::size_t>(tree.trunk.end));  // branches that children of a body are in
+    std::vector<Index> children(below.size());
+    for (const Slots branch : tree.branches) {
+      for (Index i = branch.begin; i < branch.end; ++i) {
+        if (tree.parent(i) >= tree.trunk.end) continue;
+        below[static_cast<std::size_t>(tree.parent(i))].insert(branch.begin);
+        children[static_cast<std::size_t>(tree.parent(i))] += 1;
+      }
+    }
+    bool apart = below.front().empty();
+    for (std::size_t i = 0; i < below.size(); ++i) {
+      apart = apart && below[i].size() <= 1;
+      if (children[i] * kTwig <= kBranch) CHECK(below[i].size() <= 1);
+    }
+    CHECK(tree.branches_apart == apart);
+  }
+  CHECK(balanced_tree(5000).tree.branches_apart);
+  CHECK(balanced_tree(5000).tree.most_threads() >= 4);
+  CHECK(balanced_tree(2000).tree.most_threads() == 1);
+  CHECK(humanoids(200).tree.most_threads() == 1);
+  CHECK(random_tree({.bodies = 4000, .seed = 1}).tree.branches_apart);
+  CHECK_FALSE(humanoids(100).tree.branches_apart);
+  CHECK_FALSE(balanced_tree(1 + 3 * kBranch, 3 * kBranch).tree.branches_apart);
+}
+
+TEST_CASE("bodies of branches wait in rows that none of the trunk has") {
+  for (const Model& model : large_trees()) {
+    const Tree& tree = model.tree;
+    INFO(model.names.model);
+    Index end = 0;  // of the rows of the trunk
+    for (Index i = 0; i < tree.trunk.end; ++i) {
+      if (tree.is_leaf(i) == 0) end = std::max(end, tree.waiting(i) + 1);
+    }
+    Slots third{0, 0};
+    third.branch = tree.trunk.end;
+    third.waiting_more = 2 * tree.waiting_rows;
+    for (Index i = tree.trunk.end; i < tree.shape.slots; ++i) {
+      if (tree.is_leaf(i) != 0) continue;
+      if (tree.waiting(i) < end || tree.waiting(i) >= end + tree.waiting_rows) FAIL("slot " << i);
+      if (tree.waiting_row(third, i) != tree.waiting(i) + third.waiting_more) FAIL("slot " << i);
+    }
+    CHECK(tree.waiting_row(third, 0) == tree.waiting(0));
+  }
+}
+
 TEST_CASE("an order in which a child comes before its parent is refused") {
   CHECK_THROWS_AS(Tree::from_sorted({0, 2, 0}, {JointKind::screw, JointKind::screw, JointKind::screw}), std::invalid_argument);
 }
