@@ -31,7 +31,7 @@ namespace linden {
 /// What is known of the factor of an earlier step, as numbers of a checkpoint.
 struct HeldFactor {
   double age = 0;       // steps since it was made; 0: there is none
-  double rate = 0;      // share of the residual that a correction with such a factor left, by its age
+  double rate = 1e-3;   // share of the residual that a correction with such a factor left, by its age; until it is known, that of a wild one
   double residual = 0;  // relative, of the last first guess
   double floor = 0;     // relative residual at which the last step ended at the floor of rounding; else 0
 };

@@ -1,10 +1,6 @@
 #include "engine/step/tree_sweeps.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -27,21 +23,6 @@
 
 namespace linden {
 namespace {
-
-/// Bodies that all sweeps of one direction go over before the next part: a branch in one go. On a chain of 1,000 parts of 64 to all of
-/// it do alike, on one of 10,000 parts of 64 take 5 % more: the longer each array is read on, the better the processor reads ahead.
-constexpr Index kPart = kBranch;
-
-/// action(part) for parts of some slots, root to leaves: all sweeps of an action over as many bodies as stay in the nearest cache.
-template <class Action>
-void in_parts_down(Slots slots, const Action& action) {
-  for (Index begin = slots.begin; begin < slots.end; begin += kPart) action(slots.part(begin, std::min(begin + kPart, slots.end)));
-}
-
-template <class Action>
-void in_parts_up(Slots slots, const Action& action) {
-  for (Index end = slots.end; end > slots.begin; end -= kPart) action(slots.part(std::max(slots.begin, end - kPart), end));
-}
 
 /// Whether branches are to share rows. Motions of screws follow from delta and placements from q; motions of other joints are corrected
 /// from one evaluation to the next and need rows of their own.
@@ -72,50 +53,12 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
       holds_(!kEffects && one_pass_ && options.order == 2 && options.guess == FirstGuess::extrapolation),
       ties_(model.mimics, model.tree.shape.velocities),
-      effects_(plan, model) {
+      effects_(plan, model),
+      tree_(model.tree) {
   work_.allocate(model.tree.shape);
   if (holds_) mass_.allocate(model.tree.shape);
   is_long_chain_ = !kEffects && one_pass_ && options.order == 2 && is_long_chain(model.tree);
   shares_rows_ = !kEffects && one_pass_ && options.order == 2 && shares_rows(model.tree);
-  of_branches_.resize(model.tree.branches.size());
-}
-
-/// All of a tree down and up again, each branch both ways while it is in the cache: down(part, sum), up(part, sum). Where the last comes
-/// first, bodies of the trunk meet their children in the order of a sweep over the whole tree, which Tree::is_last_child asks for where
-/// branches are not apart. share: branches take the same rows of arrays, see Slots.
-template <bool kEffects>
-template <class Down, class Up>
-Evaluated TreeSweeps<kEffects>::down_and_up(bool last_first, bool share, const Down& down, const Up& up) {
-  const Tree& tree = model_.tree;
-  Evaluated sum;
-  if (tree.trunk.begin == tree.trunk.end) down(tree.trunk, sum);  // what starts at the world
-  in_parts_down(tree.trunk, [&](Slots part) { down(part, sum); });
-  const std::size_t count = tree.branches.size();
-  const auto both_ways = [&](std::size_t number, Index thread) {
-    Slots slots = tree.branches[last_first ? count - 1 - number : number];
-    slots.branch = slots.begin;
-    if (share) slots.back = slots.begin - tree.trunk.end - thread * kBranch;
-    slots.waiting_more = thread * tree.waiting_rows;
-    Evaluated own;
-    in_parts_down(slots, [&](Slots part) { down(part, own); });
-    in_parts_up(slots, [&](Slots part) { up(part, own); });
-    of_branches_[number] = own;
-  };
-  const Index most = tree.most_threads(), threads = most == 1 ? 1 : std::min<Index>(most, oneapi::tbb::this_task_arena::max_concurrency());
-  std::atomic<std::size_t> next = 0;
-  const auto go_through = [&](Index thread) {
-    for (std::size_t number; (number = next.fetch_add(1, std::memory_order_relaxed)) < count;) both_ways(number, thread);
-  };
-  if (threads == 1) {
-    go_through(0);
-  } else {
-    // isolated: who waits here must not begin with another instance, which may need this very memory
-    oneapi::tbb::this_task_arena::isolate(
-        [&] { oneapi::tbb::parallel_for(Index{0}, threads, go_through, oneapi::tbb::simple_partitioner{}); });
-  }
-  for (const Evaluated& own : of_branches_) sum.add(own);  // in this order whoever found them
-  in_parts_up(tree.trunk, [&](Slots part) { up(part, sum); });
-  return sum;
 }
 
 /// Placements of some bodies, and gravity there.
@@ -136,7 +79,7 @@ void TreeSweeps<kEffects>::find_potentials([[maybe_unused]] const Field<double>&
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::refresh(const Field<double>& q) {
-  down_and_up(
+  tree_.run(
       true, false, [&](Slots part, Evaluated&) { place(q, part); }, [&](Slots part, Evaluated&) { forces(part); });
   placed_ = true;
   find_potentials(q);
@@ -157,7 +100,7 @@ void TreeSweeps<kEffects>::arrive_down(Slots part, State<double>& state) {
   place(state.q, part);
 }
 
-/// Forces on some joints and momenta there; seen: see seen_, of the step that ends. Returns the work of the forces along the displacement of the step that ends.
+/// Forces on some joints and momenta there; seen: seen_ of the step that ends. Returns the work of the forces along its displacement.
 template <bool kEffects>
 double TreeSweeps<kEffects>::arrive_up(Slots part, double h, bool seen, State<double>& state) {
   forces(part);
@@ -185,7 +128,7 @@ double TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
     for (const Mimic& mimic : mimics()) state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
   if (!seen_) complete();
-  const Evaluated end = down_and_up(
+  const Evaluated end = tree_.run(
       true, false, [&](Slots part, Evaluated&) { arrive_down(part, state); },
       [&](Slots part, Evaluated& sum) { sum.work += arrive_up(part, h, seen_, state); });
   placed_ = true;
@@ -223,8 +166,8 @@ void TreeSweeps<kEffects>::forces(Slots part) {
   }
 }
 
-/// motions(part) brings work_.motion up to date on the way down; before_up(part, sum) comes first on the way up. first: of a solve, else of a
-/// correction.
+/// motions(part) brings work_.motion up to date on the way down; before_up(part, sum) comes first on the way up. first: of a solve, else
+/// of a correction.
 template <bool kEffects>
 template <class Motions, class BeforeUp>
 Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions,
@@ -266,7 +209,7 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first,
       });
     } else {
       // a correction begins where the pass before it ended: what that left is still in the cache
-      now = down_and_up(first, shares_rows_, down, up);
+      now = tree_.run(first, shares_rows_, down, up);
     }
     now.scale = now.energy;
     return now;

@@ -9,7 +9,12 @@
 //
 // One upward sweep finds residual and norm where no joint is tied to another and nobody asks for |r|; else residual, ties and solve go one
 // by one. Effects, where there are any, act in each evaluation and factor; where there are none, each branch of the tree is gone through
-// down and up before the next, or several by as many threads. Sums are those of one branch after the other however many there are. What an evaluation finds where a body turned too far is not usable.
+// down and up before the next (down_and_up.hpp). What an evaluation finds where a body turned too far is not usable.
+//
+// The end of a step and the first evaluation of the next may share their ways over the branches. Of a tree of screws alone, what is made and
+// used up within a way over a branch - placements, motions, displacements, impulses - lies in rows that all branches share. A step of a
+// binary tree of 65,535 takes 80 to 85 ns a body with both, on one core with 32 MB of last cache; 95 to 105 without the first, 112 to 140
+// without either (EPYC Zen 5).
 #pragma once
 
 #include <algorithm>
@@ -19,6 +24,7 @@
 #include <vector>
 
 #include "engine/options.hpp"
+#include "engine/step/down_and_up.hpp"
 #include "engine/step/effect_sweeps.hpp"
 #include "engine/step/extrapolation.hpp"
 #include "engine/step_report.hpp"
@@ -126,8 +132,6 @@ class TreeSweeps {
   void advance(Slots part, State<double>& state);
   void arrive_down(Slots part, State<double>& state);
   double arrive_up(Slots part, double h, bool seen, State<double>& state);
-  template <class Down, class Up>
-  Evaluated down_and_up(bool last_first, bool share, const Down& down, const Up& up);
   template <class Motions, class BeforeUp>
   Evaluated evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions, const BeforeUp& before_up);
   template <class Added>
@@ -150,7 +154,6 @@ class TreeSweeps {
   bool has_gravity_;
   bool one_pass_, holds_;
   bool shares_rows_ = false;  // branches do, see Slots
-  std::vector<Evaluated> of_branches_;
   bool is_long_chain_ = false;
   bool complete_ = true;      // see complete()
   bool placed_ = true;        // placements of all bodies are there; so between steps
@@ -164,6 +167,7 @@ class TreeSweeps {
   Workspace<double> work_;
   MimicTies<double> ties_;
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
+  DownAndUp<Evaluated> tree_;
   Field<double> read_;  // see read_velocity
   MassFactor<double> mass_;  // empty where nothing is held
 };
