@@ -103,7 +103,7 @@ class Bench {
       effects.begin(0.0, options_.step, state_.q, past, history_ >= 2, work_.delta);
       sweeps_.begin(history_ > 0, 0);
     }
-    sweeps_.evaluate(report);
+    sweeps_.evaluate(true, report);
     momentum_map(model_.tree, model_.constants, work_.displacement, impulse_);  // as it was before it was summed over the subtrees
   }
 

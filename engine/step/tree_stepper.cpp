@@ -152,13 +152,16 @@ double TreeStepper<kEffects>::contact([[maybe_unused]] Index k) const {
 
 template <bool kEffects>
 std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
+  std::vector<std::span<double>> kept;
   if constexpr (kEffects) {
-    const auto memory = effects_.memory();
-    return {memory.begin(), memory.end()};
+    const auto of_effects = effects_.memory();
+    kept.assign(of_effects.begin(), of_effects.end());
   }
-  if (!sweeps_.holds()) return {};
-  const auto factor = sweeps_.factor_memory();
-  return {{&held_.age, 1}, {&held_.rate, 1}, {&held_.residual, 1}, {&held_.floor, 1}, factor[0], factor[1], factor[2]};
+  if (sweeps_.holds()) {
+    const auto factor = sweeps_.factor_memory();
+    kept.insert(kept.end(), {{&held_.age, 1}, {&held_.rate, 1}, {&held_.residual, 1}, {&held_.floor, 1}, factor[0], factor[1], factor[2]});
+  }
+  return kept;
 }
 
 /// Whether one correction with the factor there is, in the step that comes, is likely to be enough.
@@ -233,13 +236,13 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
     const bool to_the_end = whole && creep == std::end(kSoftCreeps)[-1];
     displacement_map(model_.tree, work_.motion, work_.delta);
     effects_.soften(creep, work_.delta);
-    now = sweeps_.evaluate(report);
+    now = sweeps_.evaluate(true, report);
     norm = now.norm;
     for (int k = 0; k < kMostSoftCorrections; ++k) {
       if (!now.usable() || !std::isfinite(norm)) return;
       const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
       if (revise_effects(settled, false)) {
-        now = sweeps_.evaluate(report);
+        now = sweeps_.evaluate(true, report);
         norm = now.norm;
         continue;
       }
@@ -285,7 +288,7 @@ Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int hist
   first_guess(options_.guess, model_, state, history, h, sweeps_);
   spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
   if constexpr (kEffects) begin_effects(state, history, h);
-  return sweeps_.evaluate(report);
+  return sweeps_.evaluate(fresh, report);
 }
 
 template <bool kEffects>
@@ -296,7 +299,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
   if (!now.usable()) {
     // no displacement at all is always within the range of log
     for (double& value : work_.delta.flat()) value = 0;
-    now = sweeps_.evaluate(report);
+    now = sweeps_.evaluate(true, report);
     fresh = true;
   }
   const bool held = !fresh;  // until the first correction has been made, at the least
@@ -346,7 +349,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
         report.iterations += 1;
       }
       revisions += 1;
-      now = sweeps_.evaluate(report);
+      now = sweeps_.evaluate(true, report);
       norm = now.norm;
       return fresh = true;
     }

@@ -51,7 +51,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       options_(options),
       has_gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
       one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
-      holds_(!kEffects && one_pass_ && options.order == 2 && options.guess == FirstGuess::extrapolation),
+      holds_(one_pass_ && options.order == 2 && options.guess == FirstGuess::extrapolation && !plan.revises),
       ties_(model.mimics, model.tree.shape.velocities),
       effects_(plan, model),
       tree_(model.tree) {
@@ -361,12 +361,12 @@ void TreeSweeps<kEffects>::place_again(Slots part) {
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::evaluate(StepReport& report) {
+Evaluated TreeSweeps<kEffects>::evaluate(bool fresh, StepReport& report) {
   const auto motions = [&](Slots part) {
     place_again(part);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  return evaluate_motions(report, true, true, motions, nothing);
+  return evaluate_motions(report, true, fresh, motions, nothing);
 }
 
 template <bool kEffects>

@@ -85,9 +85,9 @@ class TreeSweeps {
   void start(const Field<double>& q) { q_ = &q; }
   /// Before the evaluations of a step with effects. known: the step before is one of these sweeps; scale: see Evaluated.
   void begin(bool known, double scale);
-  /// With a fresh factor.
-  Evaluated evaluate(StepReport& report);
-  /// The same from a guess of delta, momentum_target and all. fresh: with a fresh factor, else with the one there is; see holds.
+  /// fresh: with a fresh factor, else with the one there is; see holds.
+  Evaluated evaluate(bool fresh, StepReport& report);
+  /// The same from a guess of delta, momentum_target and all.
   Evaluated evaluate_from(const State<double>& state, const Extrapolation& guess, double h, bool fresh, StepReport& report);
   /// arrive at the end of the step before, of h_before, and evaluate_from there, both while a branch is in the cache; see can_go_on.
   Evaluated arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h, bool fresh,

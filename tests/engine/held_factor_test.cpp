@@ -36,6 +36,25 @@ TEST_CASE("a calm motion needs few factors, a wild one as many as steps, and nei
   CHECK(wild.factorisations > 350);
 }
 
+TEST_CASE("smooth effects have held factors too; where something may stick, stop or saturate each step has its own") {
+  const auto factorisations = [](const auto& add) {
+    Effects effects;
+    const Model model = humanoid();
+    add(effects, model);
+    Simulation simulation(model, {}, effects);
+    random_start(simulation, 1, 0.1);
+    run(simulation, 10);
+    const StepsReport report = simulation.run(300);
+    CHECK(report.ok());
+    CHECK(report.largest_residual <= 1e-10);
+    return report.factorisations;
+  };
+  CHECK(factorisations([](Effects& effects, const Model& model) { effects.damping = urdf_damping(model); }) < 30);
+  CHECK(factorisations([](Effects& effects, const Model&) { effects.drag.push_back({.slot = 3, .linear = 5}); }) < 30);
+  CHECK(factorisations([](Effects& effects, const Model& model) { effects.friction = urdf_friction(model); }) >= 300);
+  CHECK(factorisations([](Effects& effects, const Model& model) { effects.limits = urdf_limits(model); }) >= 300);
+}
+
 TEST_CASE("steps with a held factor meet the tolerance, and keep energy and momentum like any other") {
   for (const double tolerance : {1e-8, 1e-10, 1e-12}) {
     Simulation simulation(humanoid(), {.gravity = {0, 0, 0}, .tolerance = tolerance});
