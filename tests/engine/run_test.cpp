@@ -95,6 +95,19 @@ TEST_CASE("a run ends with the last step that can be taken, and leaves what that
   CHECK(together.energy().total() == one_by_one.energy().total());
 }
 
+TEST_CASE("a step of a run that has to be split is split as it would be alone") {
+  const Model model = balanced_tree(2500);
+  const Options options{.step = 0.02};
+  Simulation together(model, options), one_by_one(model, options);
+  for (Simulation* simulation : {&together, &one_by_one}) random_start(*simulation, 3, 0.1);
+  const StepsReport report = together.run(40);
+  REQUIRE(report.ok());
+  REQUIRE(report.split_steps > 0);
+  REQUIRE(report.split_steps < 40);
+  for (int k = 0; k < 40; ++k) run(one_by_one, 1);
+  compare(together, one_by_one);
+}
+
 TEST_CASE("a run with no steps to take changes nothing") {
   Simulation simulation(chain(3));
   const StepsReport report = simulation.run(0);
