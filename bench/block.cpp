@@ -134,7 +134,7 @@ bool agrees(const Model& model) {
     worst = std::max(worst, std::abs(work.increment(row) - block.work.increment(row)));
     scale = std::max(scale, std::abs(work.increment(row)));
   }
-  return worst < 1e-9 * scale;
+  return worst < 1e-6 * scale;  // measured: 3e-11 for robots, 2e-7 for a chain of 100, whose mass matrix is that badly conditioned
 }
 
 /// Operations a second of one core that does nothing but multiply and add.

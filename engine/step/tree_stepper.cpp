@@ -32,12 +32,6 @@ constexpr int kMostSoftCorrections = 40;
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
 constexpr double kSteepest = 0.5;
 
-/// What is left of HeldFactor::rate after each step with a factor of its own: where the motion has calmed down holding is tried again.
-constexpr double kRateForgotten = 0.95;
-
-/// Steps that a factor is held at most: it is also the measure by which residuals are judged.
-constexpr int kOldestFactor = 32;
-
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -159,16 +153,9 @@ std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
   }
   if (sweeps_.holds()) {
     const auto factor = sweeps_.factor_memory();
-    kept.insert(kept.end(), {{&held_.age, 1}, {&held_.rate, 1}, {&held_.residual, 1}, {&held_.floor, 1}, factor[0], factor[1], factor[2]});
+    kept.insert(kept.end(), {held_.numbers(), factor[0], factor[1], factor[2]});
   }
   return kept;
-}
-
-/// Whether one correction with the factor there is, in the step that comes, is likely to be enough.
-template <bool kEffects>
-bool TreeStepper<kEffects>::holds_factor() const {
-  if (!sweeps_.holds() || !(held_.age > 0) || held_.age > kOldestFactor) return false;
-  return held_.residual * held_.rate * held_.age <= std::max(options_.tolerance, held_.floor);
 }
 
 /// Whether the state of an effect changed; work_.delta then says what the motion is to be.
@@ -273,7 +260,7 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
 template <bool kEffects>
 Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report) {
   sweeps_.start(state.q);
-  fresh = history == 0 || !holds_factor();
+  fresh = history == 0 || !sweeps_.holds() || !held_.serves(options_.tolerance);
   if (to_end_ != 0) {
     const Extrapolation guess = extrapolation_after(work_.delta, state.history, history);
     const Evaluated now = sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report);
@@ -304,20 +291,19 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
   }
   const bool held = !fresh;  // until the first correction has been made, at the least
   double norm = now.norm;
-  held_.residual = std::sqrt(0.5 * norm / now.scale);
-  if (fresh) held_.rate *= kRateForgotten;
+  held_.begin(std::sqrt(0.5 * norm / now.scale), fresh);
   enough_ = options_.reduction * options_.reduction * std::min(norm, 2 * kRoughGuess * kRoughGuess * now.scale);
   StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
 
   bool at_floor = false;
   const auto end = [&](StepStatus status) {
     const double relative = now.scale > 0 ? std::sqrt(0.5 * norm / now.scale) : std::sqrt(norm);
-    held_.age = status != StepStatus::converged ? 0 : held && report.factorisations == factors_before ? held_.age + 1 : 1;
-    held_.floor = at_floor ? relative : 0;
     if (status == StepStatus::converged) {
+      held_.end(relative, at_floor, !held || report.factorisations > factors_before);
       momentum_energy_ = now.energy;
       report.residual = std::max(report.residual, relative);
     } else {
+      held_.drop();
       failed_residual_ = relative;
     }
     if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_);
@@ -381,10 +367,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
     const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.scale;
     at_floor = (slow && sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) ||
                (close && !converged(now, norm, h) && sweeps_.at_rounding_floor(now, norm, fall(h), kBareRounding));
-    if (held && iteration == 0) {
-      const double rate = std::min(1.0, std::sqrt(norm / before) / held_.age);
-      held_.rate = at_floor ? std::min(held_.rate, rate) : rate;  // rounding says no more than that it was not larger
-    }
+    if (held && iteration == 0) held_.corrected(std::sqrt(norm / before), at_floor);
     if (at_floor) continue;
     for (int cut = 0; !(norm < before) && cut < kMaxBacktracks; ++cut) {
       taken /= 2;

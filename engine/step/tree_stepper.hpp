@@ -5,7 +5,7 @@
 //   first guess         delta; both on the way down of the first evaluation where nothing else needs them before
 //   +-> motion_map      M = exp(S delta)
 //   |   displacement_down, momentum_map                         DRNEA, downward half
-//   |   newton_factor_up (where that of an earlier step does not serve) or articulated_inertia_up (riqn)
+//   |   newton_factor_up (where that of an earlier step does not serve: held_factor.hpp) or articulated_inertia_up (riqn)
 //   |   innovation_up (or residual_up, impulse_pass_up)         DRNEA, upward half: h r(delta); its energy norm: usable? converged?
 //   +-- increment_down, correct_motion_map                      delta <- delta (-) Delta
 //   advance_map, placement_map, gravity, momentum_update_map
@@ -13,30 +13,15 @@
 // Effects (effect_sweeps.hpp) act after momentum_map and on the target, are part of the factor, and have their states - sticks, slides,
 // at a limit - revised between corrections. Compiled with them and without (kEffects): a step without asks for none.
 //
-// A correction with the factor of the step itself leaves next to nothing of the residual; with one of an earlier step a share of some 1e-5
-// to 1e-2 for each step since. Where so much of what first guesses leave is below the tolerance, or below the floor of rounding, the factor
-// is held. A floating humanoid has one in 33 steps so and takes 62 ns a body instead of 116, 1,000 bodies of all kinds 97 instead of 161,
-// a binary tree of 1,023 in its first hundred steps 51 instead of 77; a chain that whips has one a step as before. Energy and momentum are
-// the same to their digits (tests/engine/held_factor_test.cpp): what a solve leaves is handed on, and it leaves no more than the tolerance.
-// Not so where effects stick, stop or saturate: their states are judged by forces that only exact corrections bring out in time. Held there,
-// a resting arm was seen to break loose.
-//
 // The equation may have other roots, far from the motion, once a step is too large for it. Whoever lands on one gains energy out of
 // nothing: kinetic energy of the mean motion minus the work of the forces is compared with the step before.
 #pragma once
 
+#include "engine/step/held_factor.hpp"
 #include "engine/step/stepper.hpp"
 #include "engine/step/tree_sweeps.hpp"
 
 namespace linden {
-
-/// What is known of the factor of an earlier step, as numbers of a checkpoint.
-struct HeldFactor {
-  double age = 0;       // steps since it was made; 0: there is none
-  double rate = 1e-3;   // share of the residual that a correction with such a factor left, by its age; until it is known, that of a wild one
-  double residual = 0;  // relative, of the last first guess
-  double floor = 0;     // relative residual at which the last step ended at the floor of rounding; else 0
-};
 
 template <bool kEffects>
 class TreeStepper final : public Stepper {
@@ -69,7 +54,6 @@ class TreeStepper final : public Stepper {
   void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
     requires kEffects;
   double fall(double h) const;
-  bool holds_factor() const;
   Evaluated first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report);
   StepStatus solve(State<double>& state, int history, double h, StepReport& report);
   StepStatus find_root(State<double>& state, int history, double h, StepReport& report);
