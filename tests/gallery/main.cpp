@@ -47,7 +47,7 @@ int run_gallery(int argc, char** argv) {
   bool full = false, quick = false, list = false, alone = false;
   std::vector<std::string> names;
   std::string csv, markdown;
-  program.add_flag("--full", full, "Long runs and large sizes: half an hour, instead of a minute");
+  program.add_flag("--full", full, "Long runs and large sizes: five to ten minutes, instead of half a minute");
   program.add_flag("--quick", quick, "Shorter still: for builds with sanitizers");
   program.add_flag("--list", list, "Name the cases");
   program.add_flag("--alone", alone, "No other engine, even where one is installed");
