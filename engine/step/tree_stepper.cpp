@@ -383,7 +383,9 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
       if (fresh || options_.solver == Solver::riqn) return end(trouble);
     }
     fresh = false;
-    if (slow && options_.solver == Solver::newton) {
+    // a held factor that another correction like this would not be enough with has been held for too long
+    const bool stale = held && iteration == 0 && 0.5 * norm * (norm / before) > options_.tolerance * options_.tolerance * now.scale;
+    if ((slow || stale) && options_.solver == Solver::newton) {
       sweeps_.factor_again(now, report);
       norm = now.norm;
       fresh = true;
