@@ -36,6 +36,18 @@ class Shell : public Folder {
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text_of(outputs / "out"), text_of(outputs / "err")};
   }
+
+  /// Interrupted half a second after it has begun to listen for that, however long it takes to begin.
+  Outcome interrupted(const std::string& arguments) const {
+    const Folder scripts;
+    scripts.write("interrupted",
+                  "\"$@\" & pid=$!\n"
+                  "until ! kill -0 $pid || grep -q '^SigCgt:.*[2367abef]$' /proc/$pid/status; do sleep 0.05; done\n"
+                  "sleep 0.5\n"
+                  "kill -INT $pid\n"
+                  "wait $pid\n");
+    return linden(arguments, fmt::format("sh '{}'", scripts.file("interrupted")));
+  }
 };
 
 /// Exit code 2, one line on stderr that says `expected`, nothing on stdout, and no file but those that were there.

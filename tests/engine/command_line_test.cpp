@@ -256,8 +256,7 @@ TEST_CASE("a step that fails ends the run with 1, names a body and keeps what is
 
 TEST_CASE("an interrupted run keeps what is good", "[command line]") {
   const Shell shell;
-  const Outcome outcome = shell.linden("run chain:5 --duration 1e6 --record a.csv --json a.json --save a.checkpoint",
-                                        "timeout --preserve-status --signal=INT 2");
+  const Outcome outcome = shell.interrupted("run chain:5 --duration 1e6 --record a.csv --json a.json --save a.checkpoint");
   CHECK(outcome.exit_code == 130);
   CHECK_THAT(outcome.err, StartsWith("linden: interrupted at ") && Contains("valid up to there"));
   const Csv csv = csv_of(shell / "a.csv");
