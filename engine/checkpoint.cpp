@@ -23,7 +23,7 @@
 namespace linden {
 namespace {
 
-constexpr std::string_view kMagic = "linden checkpoint 4\n";
+constexpr std::string_view kMagic = "linden checkpoint 4\n", kAnyFormat = "linden checkpoint ";
 constexpr std::int64_t kMostSteps = std::int64_t{1} << 53;  // beyond it their count times the step has no double of its own
 
 struct Header {
@@ -87,6 +87,11 @@ void Simulation::load(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: the checkpoint cannot be read; does the file exist?", file));
   const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  if (!bytes.starts_with(kMagic) && bytes.starts_with(kAnyFormat)) {
+    throw InputError(fmt::format("{}: this checkpoint was saved by another version of linden, in another format; expected one that begins "
+                                 "with \"{}\"; continue its run with that version, or begin anew",
+                                 file, kMagic.substr(0, kMagic.size() - 1)));
+  }
   if (!bytes.starts_with(kMagic)) throw InputError(fmt::format("{}: this is no checkpoint of linden", file));
 
   State<double> loaded;

@@ -19,17 +19,18 @@ void StepReport::add(const StepReport& more) {
 }
 
 void StepsReport::add(const StepReport& step) {
-  last = step;
-  if (!step.ok()) return;
-  steps += 1;
-  iterations += step.iterations;
-  evaluations += step.evaluations;
-  factorisations += step.factorisations;
-  substeps += step.substeps;
-  most_iterations = std::max(most_iterations, step.iterations);
-  split_steps += step.substeps > 1 ? 1 : 0;
-  floor_steps += step.at_rounding_floor ? 1 : 0;
-  largest_residual = std::max(largest_residual, step.residual);
+  StepsReport one{.last = step};
+  if (step.ok()) {
+    one.steps = 1;
+    one.iterations = one.most_iterations = step.iterations;
+    one.evaluations = step.evaluations;
+    one.factorisations = step.factorisations;
+    one.substeps = step.substeps;
+    one.split_steps = step.substeps > 1 ? 1 : 0;
+    one.floor_steps = step.at_rounding_floor ? 1 : 0;
+    one.largest_residual = step.residual;
+  }
+  add(one);
 }
 
 void StepsReport::add(const StepsReport& more) {

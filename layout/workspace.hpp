@@ -13,6 +13,12 @@ namespace linden {
 template <class Scalar>
 inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
 
+/// A factored matrix of the tree: the mass matrix or a Jacobian.
+#define LINDEN_FACTOR_FIELDS(FIELD)                                                          \
+  FIELD(Scalar, gain_up, 6, velocities, "Pi S d^-1, one row a degree of freedom")            \
+  FIELD(Scalar, gain_down, 6, velocities, "(S^T Pi)^T d^-T, one row a degree of freedom")    \
+  FIELD(Scalar, joint_inverse, 1, blocks, "d^-1, d = S^T Pi S, row by row")
+
 #define LINDEN_WORKSPACE_FIELDS(FIELD)                                                                                 \
   FIELD(Scalar, placement, 12, slots, "X: child -> parent at q; rotation row by row, shift [m]")                       \
   FIELD(Scalar, motion, 7, slots, "exp(S delta): the joint's own displacement; quaternion x y z w, shift [m]")         \
@@ -21,9 +27,7 @@ inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
   FIELD(Scalar, turn, 3, slots, "angular part of h V [rad]")                                                           \
   FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
   FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia; or what of Pi waits, see Tree::waiting") \
-  FIELD(Scalar, gain_up, 6, velocities, "Pi S d^-1, one row a degree of freedom")                                      \
-  FIELD(Scalar, gain_down, 6, velocities, "(S^T Pi)^T d^-T, one row a degree of freedom")                              \
-  FIELD(Scalar, joint_inverse, 1, blocks, "d^-1, d = S^T Pi S, row by row")                                            \
+  LINDEN_FACTOR_FIELDS(FIELD)                                                                                          \
   FIELD(Scalar, bias, 6, slots, "b: impulse that reaches the parent when the joints yield")                            \
   FIELD(Scalar, variation, 6, slots, "eta: change of the body's pose at k+1, body frame [rad, m]")                     \
   FIELD(Scalar, residual, 1, velocities, "h r [kg m^2, kg m]")                                                         \
@@ -40,11 +44,6 @@ template <class Scalar>
 struct Workspace {
   LINDEN_FIELDS(LINDEN_WORKSPACE_FIELDS)
 };
-
-#define LINDEN_FACTOR_FIELDS(FIELD)                                    \
-  FIELD(Scalar, gain_up, 6, velocities, "as in Workspace")             \
-  FIELD(Scalar, gain_down, 6, velocities, "likewise")                  \
-  FIELD(Scalar, joint_inverse, 1, blocks, "likewise")
 
 /// Factor of the mass matrix, where that of the steps is to stay when velocities are read.
 template <class Scalar>

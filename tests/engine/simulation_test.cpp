@@ -107,6 +107,7 @@ TEST_CASE("a checkpoint that does not fit is refused and changes nothing") {
   CHECK_THROWS_WITH(slower.load(folder.file("state")), Catch::Contains("0.001 s"));
   CHECK_THROWS_WITH(simulation.load(folder.file("nothing")), Catch::Contains("cannot be read"));
   CHECK_THROWS_WITH(simulation.load(write("hello")), Catch::Contains("no checkpoint"));
+  CHECK_THROWS_WITH(simulation.load(write("linden checkpoint 3\n" + bytes.substr(20))), Catch::Contains("another version of linden"));
   CHECK_THROWS_WITH(simulation.load(write(bytes.substr(0, bytes.size() - 9))), Catch::Contains("damaged or cut short"));
   std::string flipped = bytes;
   flipped[bytes.size() / 2] = static_cast<char>(flipped[bytes.size() / 2] ^ 1);
