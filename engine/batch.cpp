@@ -90,7 +90,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, pace, applied, mass, targets, frictions, contacts;
+  Numbers<Real> q, p, applied, mass, targets, frictions, excess_before, reading, contacts;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -111,8 +111,11 @@ struct BatchOf<Real>::Data {
     q.resize(rows(shape().positions));
     p.resize(rows(shape().velocities));
     past.resize(rows(shape().velocities * kHistoryWords<Real>));
+    if (plan.any()) {
+      excess_before.resize(rows(shape().velocities));
+      reading.resize(rows(shape().velocities));
+    }
     contacts.resize(rows(static_cast<Index>(plan.ground.points.size())));
-    pace.assign(rows(2), std::numeric_limits<Real>::quiet_NaN());
     records.resize(static_cast<std::size_t>(size));
     const std::vector<double> neutral = model->neutral();
     for_blocks([&](std::int64_t b, Worker&) {
@@ -135,11 +138,12 @@ struct BatchOf<Real>::Data {
     return {q.data() + at(b, shape().positions),
             p.data() + at(b, nv),
             past.data() + at(b, nv * kHistoryWords<Real>),
-            pace.data() + at(b, 2),
             applied.empty() ? nullptr : applied.data() + at(b, nv),
             mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
             targets.empty() ? nullptr : targets.data() + at(b, count_of(plan.effects.servos)),
             frictions.empty() ? nullptr : frictions.data() + at(b, count_of(plan.effects.friction)),
+            excess_before.empty() ? nullptr : excess_before.data() + at(b, nv),
+            reading.empty() ? nullptr : reading.data() + at(b, nv),
             contacts.empty() ? nullptr : contacts.data() + at(b, static_cast<Index>(plan.ground.points.size())),
             records.data() + b * lanes,
             static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
@@ -186,6 +190,7 @@ struct BatchOf<Real>::Data {
   }
 
   void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
+    alone.forget();
     std::ranges::copy(positions, alone.state().q.flat().begin());
     normalise_positions(*model, alone.state().q.flat());
     for (std::size_t k = 0; k < velocities.size(); ++k) {
@@ -198,14 +203,18 @@ struct BatchOf<Real>::Data {
       }
     }
     alone.set_velocities(velocities);
-    const BatchView<Real> to_q(q, shape().positions, lanes), to_p(p, shape().velocities, lanes), to_pace(pace, 2, lanes);
+    const BatchView<Real> to_q(q, shape().positions, lanes), to_p(p, shape().velocities, lanes);
     for (Index row = 0; row < shape().positions; ++row) to_q(i, row) = static_cast<Real>(alone.state().q(row));
     for (Index row = 0; row < shape().velocities; ++row) to_p(i, row) = static_cast<Real>(alone.state().p(row));
-    for (Index row = 0; row < 2; ++row) to_pace(i, row) = std::numeric_limits<Real>::quiet_NaN();
-    const BatchView<std::uint32_t> to_past(past, shape().velocities * kHistoryWords<Real>, lanes);
-    for (Index row = 0; row < to_past.rows(); ++row) to_past(i, row) = 0;
-    const BatchView<Real> to_contacts(contacts, static_cast<Index>(plan.ground.points.size()), lanes);
-    for (Index row = 0; row < to_contacts.rows(); ++row) to_contacts(i, row) = 0;
+    const auto clear = [&](auto& numbers, Index count_of_rows) {
+      using Number = typename std::remove_reference_t<decltype(numbers)>::value_type;
+      const BatchView<Number> rows(numbers, count_of_rows, lanes);
+      for (Index row = 0; !numbers.empty() && row < count_of_rows; ++row) rows(i, row) = Number(0);
+    };
+    clear(past, shape().velocities * kHistoryWords<Real>);
+    clear(excess_before, shape().velocities);
+    clear(reading, shape().velocities);
+    clear(contacts, static_cast<Index>(plan.ground.points.size()));
     records[static_cast<std::size_t>(i)] = {};
   }
 };
@@ -363,7 +372,7 @@ BatchView<const Real> BatchOf<Real>::momenta() const {
 template <class Real>
 typename BatchOf<Real>::Observation BatchOf<Real>::observe() const {
   const Index nv = data_->shape().velocities;
-  Observation seen{std::vector<Real>(data_->p.size()), std::vector<Real>(data_->pace.size()), nv, lanes()};
+  Observation seen{std::vector<Real>(data_->p.size()), std::vector<Real>(data_->at(data_->blocks, 2)), nv, lanes()};
   data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) {
     worker.block->observe(data_->block(b), seen.velocity_numbers.data() + data_->at(b, nv), seen.energy_numbers.data() + data_->at(b, 2));
   });
@@ -401,8 +410,8 @@ std::string BatchOf<Real>::describe(std::int64_t i) const {
 template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
   std::size_t numbers = 0;
-  for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->pace, &data_->applied, &data_->mass, &data_->targets, &data_->frictions,
-                                    &data_->contacts}) {
+  for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->frictions,
+                                    &data_->excess_before, &data_->reading, &data_->contacts}) {
     numbers += some->size();
   }
   return numbers * sizeof(Real) +

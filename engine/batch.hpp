@@ -9,7 +9,7 @@
 //
 // Memory is [block][row][lane]: a block of W instances, W the lanes of the processor's registers, lies together, so that a thread takes it
 // through many steps without leaving its cache. Positions, momenta and one number more a degree of freedom and instance are all
-// that is kept.
+// that is kept; with effects three more, and one a contact point.
 //
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
@@ -119,8 +119,7 @@ class BatchOf {
 
   BatchView<const Real> positions() const;
   BatchView<const Real> momenta() const;
-  /// v = M(q)^-1 p and energy (kinetic, potential [J]) of all instances, computed at every call. Where stiff effects hold a weight, v is off by
-  /// up to half of what the weight gives in a step; a Simulation evens that out (kernels/effects/body_impulses.hpp).
+  /// Velocities of the motion (engine/step/velocity.md) and energy (kinetic, potential [J]) of all instances, computed at every call.
   struct Observation {
     std::vector<Real> velocity_numbers, energy_numbers;
     Index nv;

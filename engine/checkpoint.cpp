@@ -1,6 +1,6 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
-//   "linden checkpoint 4\n"
+//   "linden checkpoint 5\n"
 //   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of the stepper's numbers (little endian, as laid out below)
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
 //   where a step has sub-steps, what their first guesses know (engine/step/stage_guess.hpp): counts, numbers
@@ -23,7 +23,7 @@
 namespace linden {
 namespace {
 
-constexpr std::string_view kMagic = "linden checkpoint 4\n", kAnyFormat = "linden checkpoint ";
+constexpr std::string_view kMagic = "linden checkpoint 5\n", kAnyFormat = "linden checkpoint ";
 constexpr std::int64_t kMostSteps = std::int64_t{1} << 53;  // beyond it their count times the step has no double of its own
 
 struct Header {

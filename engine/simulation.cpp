@@ -37,7 +37,6 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
     stage_guess_.emplace(stages, model_->tree.shape.velocities);
     good_q_ = state_.q;
     good_p_ = state_.p;
-    good_pace_.allocate(2);
   }
   changed();
 }
@@ -59,7 +58,7 @@ void Simulation::changed() {
   stepper_->forget();
   std::ranges::fill(state_.history.flat(), 0.0);
   if (stage_guess_) stage_guess_->forget();
-  std::ranges::fill(state_.pace.flat(), std::numeric_limits<double>::quiet_NaN());
+  state_.last_step(0) = 0;
   stepper_->refresh(state_);
 }
 
@@ -154,7 +153,6 @@ StepReport Simulation::take_step(bool another) {
 StepReport Simulation::step_in_stages() {
   std::ranges::copy(state_.q.flat(), good_q_.flat().begin());
   std::ranges::copy(state_.p.flat(), good_p_.flat().begin());
-  std::ranges::copy(state_.pace.flat(), good_pace_.flat().begin());
   StepReport whole;
   const std::span<const double> stages = composition(options_.order);
   const bool extrapolates = options_.guess == FirstGuess::extrapolation;
@@ -175,7 +173,6 @@ StepReport Simulation::step_in_stages() {
     std::ranges::copy(good_q_.flat(), state_.q.flat().begin());
     std::ranges::copy(good_p_.flat(), state_.p.flat().begin());
     changed();
-    std::ranges::copy(good_pace_.flat(), state_.pace.flat().begin());
     break;
   }
   return whole;

@@ -50,7 +50,7 @@ class Simulation {
 
   std::span<const double> positions() const { return state_.q.flat(); }
   std::span<const double> momenta() const { return state_.p.flat(); }
-  /// v = M(q)^-1 p: one O(n) solve.
+  /// Velocities of the motion: one O(n) solve (engine/step/velocity.md).
   std::vector<double> velocities();
 
   /// Throw InputError for a wrong count or a number that is not finite. Quaternions are normalised; mimic joints follow their
@@ -105,7 +105,7 @@ class Simulation {
   std::int64_t steps_ = 0;
   int history_ = 0;
   std::optional<StageGuess> stage_guess_;  // where a step has several sub-steps; none of them then looks at the state's history
-  Field<double> good_q_, good_p_, good_pace_;  // at the beginning of a step of several sub-steps
+  Field<double> good_q_, good_p_;  // at the beginning of a step of several sub-steps
 };
 
 }  // namespace linden

@@ -44,14 +44,13 @@ template <int W, class Real>
   }
 }
 
-/// One lane's displacement of the last step (`steps` 1) or of the one before (2). past: word of that lane.
-template <int W, class Real>
-[[gnu::always_inline]] inline Real remembered(const std::uint32_t* past, int steps) {
+/// One lane's displacement of the last step. past: word of that lane.
+template <class Real>
+[[gnu::always_inline]] inline Real remembered(const std::uint32_t* past) {
   if constexpr (kHistoryWords<Real> == 2) {
-    const double last = static_cast<double>(std::bit_cast<float>(past[0]));
-    return steps == 1 ? last : last - static_cast<double>(fine_part(past[W]));
+    return static_cast<double>(std::bit_cast<float>(past[0]));
   } else {
-    return steps == 1 ? fine_part(past[0]) : fine_part(past[0]) - coarse_part(past[0]);
+    return fine_part(past[0]);
   }
 }
 

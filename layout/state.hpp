@@ -1,8 +1,8 @@
 // layout/state.hpp
 // What a checkpoint saves: everything the future of a simulation depends on.
 //
-// The state of the system itself is (q, p). The displacements of the last steps only feed the first guess of the next solve, and the
-// energies only judge its solution; they are kept here because a run continued from a checkpoint is to be bit-identical.
+// The state of the system itself is (q, p). The displacements of the last steps only feed the first guess of the next solve and judge
+// its solution; they are kept here because a run continued from a checkpoint is to be bit-identical.
 #pragma once
 
 #include "layout/field.hpp"
@@ -17,7 +17,7 @@ inline constexpr int kHistory = 5;
   FIELD(Scalar, q, 1, positions, "joint positions [rad, m, unit quaternion x y z w]")                                  \
   FIELD(Scalar, p, 1, velocities, "discrete conjugate momenta [kg m^2/s, kg m/s], body frame for ball and free joints") \
   FIELD(Scalar, history, kHistory, velocities, "displacements of the last steps, latest first [rad, m]")                       \
-  FIELD(Scalar, pace, 2, instance, "last step: kinetic energy of the mean motion, work of the forces [J]; NaN = unknown")
+  FIELD(Scalar, last_step, 1, instance, "length of the step that the latest displacement is of; 0 = none is known [s]")
 
 template <class Scalar>
 struct State {

@@ -51,11 +51,12 @@ struct Block {
   Real* q;                    // [nq]
   Real* p;                    // [nv]
   std::uint32_t* past;        // layout/packed_history.hpp
-  Real* pace;                 // [2]  see State
   const Real* applied;        // [nv] forces given from outside; null: none
   const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
   const Real* targets;        // [servos] targets of each instance; null: the plan's
   const Real* frictions;      // [frictions] forces of each instance; null: the plan's
+  Real* excess_before;        // [nv] see EffectMemory; null: no effects
+  Real* reading;              // [nv] likewise
   Real* contacts;             // [points] how each contact point ended the last step (EffectSweeps::contact); null: none
   InstanceRecord* instances;  // [W]
   int count;                  // instances in use, 1 to W

@@ -84,6 +84,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
       return run.kind == JointKind::screw && damper.row >= tree.first_v(run.begin) && damper.row <= tree.first_v(run.end - 1);
     });
   });
+  bounces = std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return limit.restitution > 0; });
   revises = !effects.friction.empty() || !effects.limits.empty() || !points.empty() ||
             std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
 

@@ -36,6 +36,7 @@ struct EffectPlan {
   bool bodies = false;   // on bodies
   bool springs = false;  // some potential beside gravity's
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
+  bool bounces = false;  // some limit has a restitution
   bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
   bool any() const { return joints || bodies; }
 

@@ -35,6 +35,9 @@
 
 namespace linden {
 
+/// In the place of an impulse: the joint is held, its velocity zero. Anything above kMostRead says so.
+inline constexpr double kHeld = 1e36, kMostRead = 1e35;
+
 /// f of each number of a Scalar.
 template <class S, class Function>
 LINDEN_INLINE S in_each_lane(const S& x, const Function& f) {
@@ -57,8 +60,6 @@ class EffectSweeps {
     const auto rows = [](Field<S>& field, std::size_t count) { field.allocate(static_cast<Index>(count)); };
     if (plan.joints || !std::is_arithmetic_v<S>) sum_.allocate(tree_.shape);  // factors of blocks add both
     if (plan.joints) {
-      last_.allocate(tree_.shape.velocities);
-      even_.allocate(tree_.shape.velocities);
       rows(force_, effects.torques.size());
       servos_.entries = effects.servos;
       servos_.share = plan.servo_share;
@@ -74,6 +75,7 @@ class EffectSweeps {
       limits_.entries = effects.limits;
       for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
     }
+    for (Field<S>* field : {&excess_, &excess_before_, &reading_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
     if (plan.rotor.rows() > 0) {
       rotors_.allocate(plan.rotor.rows());
       for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
@@ -113,6 +115,11 @@ class EffectSweeps {
     if (rotors_.rows() == 0) return action(NothingAdded{});
     action(EffectsAdded<S, true, false>{rotors_, bodies_.pull});
   }
+  /// And for the mass matrix that velocities are read with, after begin_reading: a joint that is held is taken out.
+  template <class Action>
+  void with_reading(const Action& action) const {
+    action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
+  }
   Index contacts() const { return points_.slides.rows(); }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
@@ -132,9 +139,10 @@ class EffectSweeps {
     return potential;
   }
 
-  /// delta: the first guess, moved into the limits. past(row, k): displacement k steps before, where two are `known`.
-  template <class Past, class Mask>
-  void begin(const S& time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
+  /// delta: the first guess, moved into the limits. before: displacement of the step before, where it is `known`. passable: limits that
+  /// joints bounce off, see limits.hpp.
+  template <class Mask>
+  void begin(const S& time, const S& h, const Field<S>& q, const Field<S>& before, const Mask& known, bool passable, Field<S>& delta) {
     h_ = h;
     q_ = &q;
     creep_ = 0;
@@ -149,8 +157,8 @@ class EffectSweeps {
       force_(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return torque.force.at(t); });
     }
     std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
-    begin_friction(frictions_, past, known, delta);
-    begin_limits(limits_, plan_.q_row, h, q, past, known, delta);
+    begin_friction(frictions_, before, known, delta);
+    begin_limits(limits_, plan_.q_row, q, before, known, passable, delta);
     assemble();
   }
 
@@ -164,9 +172,9 @@ class EffectSweeps {
       ground_map(plan_.ground, body.points.first, body.points.last, h_, creep_, displacement, points_, bodies_, impulse);
     }
   }
-  /// Before the first of them: which points slide, as the first guess and the last step have it. `known`: that was one of these sweeps.
-  void guess_points(const Field<S, 7>& displacement, bool known) {
-    guess_ground(plan_.ground, h_, known, displacement, points_);
+  /// Before the first of them: which points slide, as the first guess and the last step have it.
+  void guess_points(const Field<S, 7>& displacement) {
+    guess_ground(plan_.ground, h_, true, displacement, points_);
     std::ranges::copy(points_.closed.flat(), points_.factored.flat().begin());
   }
 
@@ -203,8 +211,10 @@ class EffectSweeps {
   /// What the next step wants to know of this one: where contact points stick and how they moved, and what velocities are read with.
   auto memory() {
     return std::array{points_.closed.flat(), points_.slides.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
-                      bodies_.last.flat(), bodies_.even.flat(), last_.flat(), even_.flat()};
+                      excess_before_.flat(), reading_.flat()};
   }
+  Field<S>& excess_before() { return excess_before_; }
+  Field<S>& reading() { return reading_; }
 
   /// The same of contact points alone, one number each: 0 apart, 1 sticks, 2 slides.
   S contact(Index k) const { return points_.closed(k) * (S(1.0) + points_.slides(k)); }
@@ -236,12 +246,7 @@ class EffectSweeps {
     const S rate = S(1.0) / h_;
     for (const TouchedBody& body : plan_.touched) {
       const auto D = load<Displacement, S>(displacement, body.slot);
-      store(bodies_.uneven, body.slot, carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
-      for (int k = 0; k < 6; ++k) {
-        const S uneven = rate * bodies_.uneven(body.slot, k);
-        bodies_.even(body.slot, k) = lasting(uneven, bodies_.last(body.slot, k));
-        bodies_.last(body.slot, k) = uneven;
-      }
+      store(bodies_.uneven, body.slot, rate * carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
     }
     add_given_up(tree_, placement, bodies_.given, impulse);
     keep_ground(points_);
@@ -257,39 +262,57 @@ class EffectSweeps {
       S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
       if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
       const auto held = sum_.stiffness(row) > most;
-      // the step that comes to rest is an impact
-      uneven = select(held, select(delta(row) == zero, uneven + half * residual(row), zero), uneven);
       residual(row) = select(held, zero, residual(row));
-      uneven = rate * uneven;
-      even_(row) = lasting(uneven, last_(row));
-      last_(row) = uneven;
+      excess_(row) = select(held, as<S>(kHeld), rate * uneven);
     }
   }
 
-  /// p with the impulses of the last step taken half at each of its ends: what velocities are read from.
-  template <class Element>
-  void even_out(const BodyConstants<Element>& constants, const Field<S, 12>& placement, Field<S, 6>& scratch, Field<S>& projected,
-                Field<S>& p) const {
+  /// At the end of a step, once the bodies are where it leaves them: what velocities are read from beside p (engine/step/velocity.md).
+  /// `moves`: in which instances. scratch, projected: 6 x n, nv.
+  template <class Element, class Mask>
+  void end_reading(const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Mask& moves, Field<S, 6>& scratch,
+                   Field<S>& projected) {
+    const S most = as<S>(kMostRead), zero(0.0);
     if (plan_.bodies) {
-      std::ranges::copy(bodies_.even.flat(), scratch.flat().begin());
+      std::ranges::copy(bodies_.uneven.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
-      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + projected(row);
     }
-    if (plan_.joints) {
-      for (Index row = 0; row < p.rows(); ++row) p(row) = p(row) + even_(row);
+    for (Index row = 0; row < reading_.rows(); ++row) {
+      S now = plan_.joints ? excess_(row) : zero;
+      const auto held = now > most;
+      if (plan_.bodies) now = now + projected(row);
+      now = select(held, zero, now);
+      const S read = select(held, as<S>(kHeld), lasting(now, excess_before_(row)));
+      reading_(row) = select(moves, read, reading_(row));
+      excess_before_(row) = select(moves, now, excess_before_(row));
     }
   }
+  /// Adds to p what velocities are read from beside it, and prepares with_reading.
+  void begin_reading(Field<S>& p) {
+    const S most = as<S>(kMostRead), zero(0.0), infinite = as<S>(std::numeric_limits<double>::infinity());
+    for (Index row = 0; row < p.rows(); ++row) {
+      const auto held = reading_(row) > most;
+      p(row) = p(row) + select(held, zero, reading_(row));
+      reading_stiffness_(row) = select(held, infinite, rotors_.rows() > 0 ? rotors_(row) : zero);
+    }
+  }
+  /// A joint that was held has been struck; one that was struck has come to rest.
+  void release(Index row) {
+    if (reading_(row) > S(kMostRead)) reading_(row) = S(0.0);
+  }
+  void keep_still(Index row) { reading_(row) = S(kHeld); }
+  const Limits<S>& limits() const { return limits_; }
   /// The state is another's from now on.
   void forget() {
     const auto clear = [](auto& field) { std::ranges::fill(field.flat(), S(0.0)); };
-    clear(last_);
-    clear(even_);
-    clear(bodies_.last);
-    clear(bodies_.even);
+    clear(excess_before_);
+    clear(reading_);
+    clear(points_.closed);
+    clear(points_.slides);
   }
 
   /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
-  /// last step; `known`: it was one of these sweeps.
+  /// last step; `known`: it was one of these sweeps and as long as this one.
   EffectWork<S> work(const Field<S>& residual, const Field<S>& delta, const Field<S>& before, bool known) const {
     EffectWork<S> work;
     if (plan_.joints) {
@@ -306,24 +329,17 @@ class EffectSweeps {
     }
     return work;
   }
-  /// Magnitudes of the work of all effects in that step, springs included [J].
-  S activity(const EffectWork<S>& work, const Field<S, 7>& motion, const Field<S>& delta) const {
-    using std::abs;
-    return work.magnitude() + abs(spring_work(plan_.effects.springs, plan_.q_row, *q_, delta)) +
-           abs(ball_spring_work(plan_.effects.ball_springs, tree_, *q_, motion, delta));
-  }
   /// Its kernels by their names in the schedule (sweeps.hpp), to be measured one by one in a step that has been evaluated: visit(name,
   /// call). What the calls write is of no use.
   template <class Element, class Visit>
   void each_kernel(const BodyConstants<Element>& constants, const Field<S>& q, Workspace<S>& work, Field<S>& end, const Visit& visit) {
     const Effects& effects = plan_.effects;
-    const auto past = [&work](Index row, int) { return work.delta(row); };
     const auto on = [&](bool any, const char* name, auto call) {
       if (any) visit(name, std::move(call));
     };
     const bool points = !plan_.ground.points.empty();
-    on(!effects.limits.empty(), "begin_limits", [=, this, &q, &work] { begin_limits(limits_, plan_.q_row, h_, q, past, true, work.delta); });
-    on(!effects.friction.empty(), "begin_friction", [=, this, &work] { begin_friction(frictions_, past, true, work.delta); });
+    on(!effects.limits.empty(), "begin_limits", [=, this, &q, &work] { begin_limits(limits_, plan_.q_row, q, work.delta, true, false, work.delta); });
+    on(!effects.friction.empty(), "begin_friction", [=, this, &work] { begin_friction(frictions_, work.delta, true, work.delta); });
     on(!effects.armature.empty(), "armature_map", [=, this] { armature_map(plan_.effects.armature, sum_); });
     on(!effects.springs.empty(), "spring_map", [=, this, &q] { spring_map(plan_.effects.springs, plan_.q_row, h_, q, sum_); });
     on(!effects.ball_springs.empty(), "ball_spring_stiffness",
@@ -385,7 +401,10 @@ class EffectSweeps {
   const Tree& tree_;
   S h_{};
   double creep_ = 0;
-  Field<S> last_, even_;  // of joints, as BodyImpulses has them of bodies
+  Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
+  Field<S> excess_before_;     // of the step before, of bodies too; zero where a joint is held
+  Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held
+  Field<S> reading_stiffness_;
   const Field<S>* q_ = nullptr;
   Field<S> rotors_;  // armature of every row; no rows without
   JointImpulses<S> sum_;

@@ -2,8 +2,6 @@
 // The account of a scene's effects.
 #pragma once
 
-#include <cmath>
-
 namespace linden {
 
 /// What effects gave (driving ones) or took (losses) [J].
@@ -27,14 +25,6 @@ struct EffectWork {
 #define LINDEN_ADD(name, sense) name = name + more.name;
     LINDEN_EFFECT_WORK(LINDEN_ADD)
 #undef LINDEN_ADD
-  }
-  S magnitude() const {
-    using std::abs;
-    S sum(0.0);
-#define LINDEN_MAGNITUDE(name, sense) sum = sum + abs(name);
-    LINDEN_EFFECT_WORK(LINDEN_MAGNITUDE)
-#undef LINDEN_MAGNITUDE
-    return sum;
   }
   S given() const { return servo + torque + wrench; }
   S taken() const { return damping + friction + limits + drag + ground; }

@@ -67,11 +67,7 @@ void extrapolate(const Extrapolation& guess, const Field<double, kHistory>& hist
       next.store_unaligned(delta.row(row));
     }
   }
-  for (; row < rows.end; ++row) {
-    double next = 0;
-    for (int k = 0; k < guess.terms; ++k) next += guess.shares[static_cast<std::size_t>(k)] * history(row, k);
-    delta(row) = next;
-  }
+  for (; row < rows.end; ++row) delta(row) = extrapolated(guess, history, row);
 }
 
 void remember(const Field<double>& delta, Slots rows, Field<double, kHistory>& history) {

@@ -31,6 +31,13 @@ Extrapolation extrapolation(const Field<double, kHistory>& history, int terms);
 /// The same once `latest` has joined the history.
 Extrapolation extrapolation_after(const Field<double>& latest, const Field<double, kHistory>& history, int terms);
 
+/// One row of it.
+inline double extrapolated(const Extrapolation& guess, const Field<double, kHistory>& history, Index row) {
+  double next = 0;
+  for (int k = 0; k < guess.terms; ++k) next += guess.shares[static_cast<std::size_t>(k)] * history(row, k);
+  return next;
+}
+
 /// Rows of delta from those of history.
 void extrapolate(const Extrapolation& guess, const Field<double, kHistory>& history, Slots rows, Field<double>& delta);
 

@@ -32,8 +32,13 @@ std::span<double> InstanceStepper::applied() {
   return applied_;
 }
 
-void InstanceStepper::refresh() {
+void InstanceStepper::forget() {
   stepper_->forget();
+  std::ranges::fill(state_.history.flat(), 0.0);
+  state_.last_step(0) = 0;
+}
+
+void InstanceStepper::refresh() {
   if (!applied_.empty()) stepper_->apply(applied_);
   if (constants_.inertia.rows() > 0) sum_subtree_masses(model_.tree, constants_);
   stepper_->refresh(state_);

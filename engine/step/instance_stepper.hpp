@@ -23,17 +23,21 @@ class InstanceStepper {
   /// Generalized forces [nv] to be written; from the first call on they count.
   std::span<double> applied();
 
-  /// How contact point k ended the step (EffectSweeps::contact).
+  /// Before all else of an instance: nothing is left of the one before it.
+  void forget();
+  /// What effects keep of the step before, to be written, and of the step taken, to be read; see Stepper.
+  EffectMemory effect_memory() { return stepper_->effect_memory(); }
   double contact(Index k) const { return stepper_->contact(k); }
+  void set_contact(Index k, double contact) { stepper_->set_contact(k, contact); }
   /// Targets of the plan's servos, to be written.
   std::span<double> servo_targets() { return stepper_->servo_targets(); }
   std::span<double> friction_forces() { return stepper_->friction_forces(); }
 
-  /// One step of the state, from `time` on. state().pace says what is known of the step before.
+  /// One step of the state, from `time` on. The latest row of state().history and state().last_step say what is known of the step before.
   StepReport step(double time);
   /// p = M(q) v.
   void set_velocities(std::span<const double> v);
-  /// Energy; and rate() is v = M^-1 p.
+  /// Energy; and rate() is the velocity that is read.
   Energy observe();
   const Field<double>& rate() const { return rate_; }
 

@@ -26,7 +26,7 @@ class LaneEffects {
 
   explicit LaneEffects(const BlockSetup<Real>& setup) : tree_(setup.model.tree), sweeps_(setup.plan, setup.model) {
     end_.allocate(tree_.shape.velocities);
-    alone_contacts_.allocate(sweeps_.contacts(), Pack(Real(0)));
+    before_.allocate(tree_.shape.velocities);
   }
   EffectSweeps<Pack>* operator->() { return &sweeps_; }
 
@@ -36,18 +36,21 @@ class LaneEffects {
     };
     load(block.targets, sweeps_.servo_targets());
     load(block.frictions, sweeps_.friction_forces());
+    load(block.excess_before, sweeps_.excess_before());
+    load(block.reading, sweeps_.reading());
     for (Index k = 0; block.contacts != nullptr && k < sweeps_.contacts(); ++k) {
       sweeps_.set_contact(k, L::load(block.contacts + k * W));
     }
   }
-  void store(const Block<Real>& block) const {
-    for (Index k = 0; block.contacts != nullptr && k < sweeps_.contacts(); ++k) {
-      L::store(sweeps_.contact(k), block.contacts + k * W);
+  void store(const Block<Real>& block) {
+    for (Index row = 0; row < end_.rows(); ++row) {
+      L::store(sweeps_.excess_before()(row), block.excess_before + row * W);
+      L::store(sweeps_.reading()(row), block.reading + row * W);
     }
   }
 
   /// Returns the potential energy of springs and ground.
-  Pack refresh(const Field<Pack, 12>& placement, const Field<Pack>& q) { return potential_ = sweeps_.refresh(placement, q); }
+  Pack refresh(const Field<Pack, 12>& placement, const Field<Pack>& q) { return sweeps_.refresh(placement, q); }
 
   /// After the first guess. Lanes are each at their own time.
   void begin(const Block<Real>& block, double h, const Field<Pack>& q, Workspace<Pack>& work) {
@@ -56,16 +59,21 @@ class LaneEffects {
     Lanes known = 0;
     for (int l = 0; l < block.count; ++l) {
       time[static_cast<std::size_t>(l)] = static_cast<Real>((static_cast<double>(block.instances[l].steps) + 0.5) * h);
-      known |= block.instances[l].displacements > 1 ? 1u << l : 0u;
+      known |= block.instances[l].displacements > 0 ? 1u << l : 0u;
     }
     constexpr int words = kHistoryWords<Real> * W;
-    const auto past = [&](Index row, int steps) {
-      const std::uint32_t* const from = block.past + row * words;
+    for (Index row = 0; sweeps_.plan().joints && row < before_.rows(); ++row) {
       std::array<Real, W> each;
-      for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<W, Real>(from + l, steps);
-      return L::load(each.data());
-    };
-    sweeps_.begin(L::load(time.data()), Pack(static_cast<Real>(h)), q, past, L::mask(known), work.delta);
+      for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<Real>(block.past + row * words + l);
+      before_(row) = L::load(each.data());
+    }
+    known_ = known;
+    sweeps_.begin(L::load(time.data()), Pack(static_cast<Real>(h)), q, before_, L::mask(known), false, work.delta);
+  }
+  /// Lanes whose solution has a blow in it, which must be found in time.
+  Lanes blows() const {
+    if (!sweeps_.plan().bounces) return 0;
+    return L::bits(stopped_bounces(sweeps_.limits(), before_, L::mask(known_)));
   }
 
   /// What effects do to an evaluation, its exact factor, and its norm.
@@ -84,41 +92,48 @@ class LaneEffects {
     return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, false>{stiffness, pull});
   }
 
-  /// How much they did in the step that was solved, in either direction [J].
-  Pack activity(const Workspace<Pack>& work) const {
-    using std::abs;
-    const EffectWork<Pack> done = sweeps_.work(work.innovation, work.delta, work.delta, false);
-    Pack sum = sweeps_.activity(done, work.motion, work.delta) + potential_;
-    for (Index row = 0; row < tree_.shape.velocities; ++row) sum = sum + abs(work.force(row) * work.delta(row));
-    return sum;
+  /// What effects keep of lane l, for it to be stepped alone; and of the step that it took so. Contact points ended the step before as the
+  /// block has them, whatever lanes that are solved together have made of them since.
+  void take_out(const Block<Real>& block, int l, InstanceStepper& alone) {
+    const EffectMemory memory = alone.effect_memory();
+    for (std::size_t row = 0; row < memory.reading.size(); ++row) {
+      memory.excess_before[row] = static_cast<double>(L::lane(sweeps_.excess_before()(static_cast<Index>(row)), l));
+      memory.reading[row] = static_cast<double>(L::lane(sweeps_.reading()(static_cast<Index>(row)), l));
+    }
+    for (Index k = 0; k < sweeps_.contacts(); ++k) alone.set_contact(k, static_cast<double>(block.contacts[k * W + l]));
   }
-
-  /// Contacts of lane l, which was stepped alone.
-  void keep_alone(int l, const InstanceStepper& alone) {
-    for (Index k = 0; k < alone_contacts_.rows(); ++k) L::set_lane(alone_contacts_(k), l, alone.contact(k));
+  void keep_alone(const Block<Real>& block, int l, InstanceStepper& alone) {
+    const EffectMemory memory = alone.effect_memory();
+    for (std::size_t row = 0; row < memory.reading.size(); ++row) {
+      L::set_lane(sweeps_.excess_before()(static_cast<Index>(row)), l, memory.excess_before[row]);
+      L::set_lane(sweeps_.reading()(static_cast<Index>(row)), l, memory.reading[row]);
+    }
+    for (Index k = 0; k < sweeps_.contacts(); ++k) block.contacts[k * W + l] = static_cast<Real>(alone.contact(k));
   }
 
   /// The end of a step, of the lanes that took it together: impulses on bodies now, those of joints by add_end once the momenta are there.
-  void end(Lanes done, Workspace<Pack>& work) {
+  void end(const Block<Real>& block, Lanes done, Workspace<Pack>& work) {
     const Mask moves = L::mask(done);
     if (done != 0 && sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, work.innovation, end_);
     if (done != 0 && sweeps_.plan().bodies) sweeps_.end_bodies(work.placement, work.displacement, work.impulse);
     for (Index k = 0; k < sweeps_.contacts(); ++k) {
-      sweeps_.set_contact(k, select(moves, sweeps_.contact(k), alone_contacts_(k)));
-      alone_contacts_(k) = Pack(Real(0));
+      const Pack ended = select(moves, sweeps_.contact(k), L::load(block.contacts + k * W));
+      sweeps_.set_contact(k, ended);
+      L::store(ended, block.contacts + k * W);
     }
   }
-  void add_end(const Mask& moves, Field<Pack>& p) const {
-    if (!sweeps_.plan().joints) return;
-    for (Index row = 0; row < p.rows(); ++row) p(row) = select(moves, p(row) + end_(row), p(row));
+  template <class Element>
+  void add_end(const BodyConstants<Element>& constants, const Mask& moves, Workspace<Pack>& work, Field<Pack>& p) {
+    for (Index row = 0; sweeps_.plan().joints && row < p.rows(); ++row) p(row) = select(moves, p(row) + end_(row), p(row));
+    sweeps_.end_reading(constants, work.placement, moves, work.impulse, work.increment);
   }
 
  private:
   const Tree& tree_;
   EffectSweeps<Pack> sweeps_;
-  Field<Pack> end_;             // what they add to p at the end of a step
-  Field<Pack> alone_contacts_;  // of lanes that were stepped alone in this step; zero in others
-  Pack potential_ = Pack(Real(0));
+  Field<Pack> end_;     // what they add to p at the end of a step
+  Field<Pack> before_;  // displacement of the step before
+  Lanes known_ = 0;     // lanes in which there was one
 };
 
 /// Where a scene has none.

@@ -15,8 +15,9 @@
 // the same in any company, so results are equal to the bit in any block, any place and with any number of threads.
 //
 // The Jacobian is factored to first order at the guess, exactly at every second correction from the second on. A lane that
-// kMostCorrections do not bring home, that gets no nearer, turns a body by pi or gains energy is stepped alone, with all that a
-// Simulation can do (InstanceStepper); if that fails too it is frozen at its last good state.
+// kMostCorrections do not bring home, that gets no nearer, turns a body by pi, may have landed on another root (convergence.hpp) or strikes
+// a limit that it bounces off is stepped alone, with all that a Simulation can do (InstanceStepper); if that fails too it is frozen at
+// its last good state.
 #pragma once
 
 #include <array>
@@ -32,6 +33,7 @@
 #include "kernels/advance_down.hpp"
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/innovation_up.hpp"
+#include "kernels/largest_turn.hpp"
 #include "kernels/momentum_update_map.hpp"
 #include "kernels/rounding_floor_map.hpp"
 #include "layout/packed_history.hpp"
@@ -104,9 +106,16 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
     load(block);
+    if constexpr (kEffects) effects_.load(block);
     if (!model_.mimics.empty()) return observe_alone(block, velocities, energy);
     const Pack potential = refresh();
-    solve_mass(p_, work_.increment);
+    if constexpr (kEffects) {
+      effects_->begin_reading(p_);
+      effects_->with_reading([&](const auto& added) { factor_mass(added); });
+      apply_mass_inverse(p_, work_.increment);
+    } else {
+      solve_mass(p_, work_.increment);
+    }
     Pack kinetic = number(0);
     for (Index row = 0; row < tree_.shape.velocities; ++row) {
       kinetic = kinetic + number(0.5) * p_(row) * work_.increment(row);
@@ -184,9 +193,14 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   [[gnu::noinline]] void solve_mass(const Field<Pack>& right_side, Field<Pack>& rate) {
-    effects_->with_rotors([&](const auto& rotors) {
-      articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains(), rotors);
-    });
+    effects_->with_rotors([&](const auto& rotors) { factor_mass(rotors); });
+    apply_mass_inverse(right_side, rate);
+  }
+  template <class Added>
+  [[gnu::noinline]] void factor_mass(const Added& added) {
+    articulated_inertia_up(tree_, constants(), work_.placement, work_.articulated, gains(), added);
+  }
+  [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
     impulse_pass_up(tree_, constants(), work_.placement, gains(), right_side, work_.bias, work_.innovation);
     rate_down(tree_, constants(), work_.placement, gains(), work_.innovation, work_.variation, rate);
   }
@@ -210,11 +224,20 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
   }
 
-  /// Work of the forces along the displacement of the step [J].
-  Pack work() const {
-    Pack sum = number(0);
-    for (Index row = 0; row < tree_.shape.velocities; ++row) sum = sum + work_.force(row) * work_.delta(row);
-    return sum;
+  /// Of these lanes those that may have landed on another root: least_w of their solutions, see displacement_down.
+  Lanes in_doubt(const Block<Real>& block, Lanes lanes, const Pack& least_w) const {
+    lanes &= L::bits(least_w <= number(kFreeCosine));
+    for (int l = 0; l < block.count; ++l) {
+      if (block.instances[l].displacements == 0) lanes &= ~(1u << l);  // nothing is known of a step before
+    }
+    if (lanes == 0) return 0;
+    constexpr int words = kHistoryWords<Real> * W;
+    const Pack corrected = largest_turn(tree_, constants(), work_.delta, [&](Index row) {
+      alignas(kAlignment) Real guess[W];
+      extrapolate<W>(block.past + row * words, guess);
+      return L::load(guess);
+    });
+    return lanes & L::bits(corrected >= number(kFreeCorrection));
   }
 
   [[gnu::noinline]] void keep(Lanes lanes) { blend(kept_, work_, L::mask(lanes)); }
@@ -254,7 +277,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   struct Solved {
     Lanes done = 0, lost = 0;
-    Pack energy = number(0);  // h^2 x kinetic energy of the mean motion, of those done
+    Pack least_w = number(1);  // of those done, see displacement_down
   };
 
   Solved solve(const Block<Real>& block, Lanes active) {
@@ -277,7 +300,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
         if (corrections == kMostCorrections) given_up |= left;
         solved.lost |= given_up & ~ok;
       }
-      solved.energy = select(L::mask(ok), now.energy, solved.energy);
+      solved.least_w = select(L::mask(ok), now.least_w, solved.least_w);
       for (int l = 0; l < block.count; ++l) {
         if ((active >> l & 1u) != 0 && ((ok | solved.lost) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
       }
@@ -298,7 +321,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     Solved solved;
     effects_.begin(block, options_.step, q_, work_);
     Evaluation<Pack> now = start_down(tree_, constants(), work_);
-    if (effects_->contacts() > 0) effects_->guess_points(work_.displacement, true);
+    if (effects_->contacts() > 0) effects_->guess_points(work_.displacement);
     Pack norm = effects_.act(constants(), work_, now);
     const Pack limit = number(std::numeric_limits<Real>::max());
     const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));
@@ -314,8 +337,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
         changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
       }
       ok &= active & ~changed;
-      const Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
-      solved.energy = select(L::mask(ok), now.energy, solved.energy);
+      Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
+      if (const Lanes blows = ok & effects_.blows(); blows != 0) {
+        given_up |= blows;
+        ok &= ~blows;
+      }
+      solved.least_w = select(L::mask(ok), now.least_w, solved.least_w);
       for (int l = 0; l < block.count; ++l) {
         if (((ok | given_up) >> l & 1u) != 0) block.instances[l].evaluations += corrections + 1;
       }
@@ -330,19 +357,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   Lanes finish(const Block<Real>& block, Lanes alive, const Solved& solved) {
     Lanes done = solved.done, lost = solved.lost;
-    const double rate = 1 / options_.step;
     displacement_map(tree_, work_.motion, work_.delta);
-    const Pack kinetic = number(rate * rate) * solved.energy;
-    const Pack pace = L::load(block.pace), pace_work = L::load(block.pace + W);
-    const Pack work_at_begin = work();
-    using std::max;
-    Pack activity = number(0);
-    if constexpr (kEffects) {
-      if (done != 0) activity = effects_.activity(work_);
-    }
-    const Lanes gains =
-        L::bits(kinetic - pace - number(0.5) * (pace_work + work_at_begin) - activity > number(kMostGain) * max(kinetic, pace));
-    lost |= done & gains;
+    lost |= in_doubt(block, done, solved.least_w);
     done &= ~lost;
 
     Lanes frozen = 0;
@@ -351,19 +367,15 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
 
     const Mask moves = L::mask(done);
-    if constexpr (kEffects) effects_.end(done, work_);
+    if constexpr (kEffects) effects_.end(block, done, work_);
     advance(moves);
     update_momentum(moves);
     if constexpr (kEffects) {
-      effects_.add_end(moves, p_);
+      effects_.add_end(constants(), moves, work_, p_);
       effects_.refresh(work_.placement, q_);
     }
     if (done == 0) return alive & ~frozen;
 
-    Pack kept = kinetic;
-    if constexpr (kEffects) kept = max(kinetic, select(pace > number(0), number(kImpactMemory) * pace, number(0)));
-    L::store(select(moves, kept, L::load(block.pace)), block.pace);
-    L::store(select(moves, number(0.5) * (work_at_begin + work()), L::load(block.pace + W)), block.pace + W);
     std::array<std::int32_t, W> known;
     for (int l = 0; l < W; ++l) {
       known[static_cast<std::size_t>(l)] = -1;
@@ -384,6 +396,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   /// Lane l as it stands, for alone_.
   void take_out(const Block<Real>& block, int l) {
+    alone_.forget();
     State<double>& state = alone_.state();
     const auto take = [&](const Field<Pack>& from, std::span<double> to) {
       for (std::size_t row = 0; row < to.size(); ++row) to[row] = static_cast<double>(L::lane(from(static_cast<Index>(row)), l));
@@ -394,6 +407,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     if constexpr (kEffects) {
       if (block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
       if (block.frictions != nullptr) take(effects_->friction_forces(), alone_.friction_forces());
+      effects_.take_out(block, l, alone_);
     }
     if constexpr (kOwnMasses) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
@@ -401,11 +415,16 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
         for (int k = 0; k < 10; ++k) inertia(i, k) = static_cast<double>(L::lane(own_constants_.inertia(i, k), l));
       }
     }
-    for (int k = 0; k < 2; ++k) state.pace(0, k) = static_cast<double>(block.pace[k * W + l]);
+    if (block.instances[l].displacements == 0) return;
+    constexpr int words = kHistoryWords<Real> * W;
+    for (Index row = 0; row < state.history.rows(); ++row) {
+      state.history(row, 0) = static_cast<double>(remembered<Real>(block.past + row * words + l));
+    }
+    state.last_step(0) = options_.step;
   }
 
   void observe_alone(const Block<Real>& block, Real* velocities, Real* energy) {
-    for (int l = 0; l < W; ++l) {
+    for (int l = 0; l < block.count; ++l) {
       take_out(block, l);
       const Energy seen = alone_.observe();
       for (Index row = 0; row < p_.rows(); ++row) velocities[row * W + l] = static_cast<Real>(alone_.rate()(row));
@@ -414,17 +433,19 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
   }
 
-  /// What the next step of lane l wants to know of one taken alone: its contacts and, where it was not split, its displacement.
-  void keep_alone(const Block<Real>& block, int l, bool whole) {
-    effects_.keep_alone(l, alone_);
-    if (!whole) return;
+  /// What the next step of lane l wants to know of one taken alone: its displacement; of one that was split, that of its last part, as if it
+  /// had been as long as a step.
+  void keep_alone(const Block<Real>& block, int l) {
+    if constexpr (kEffects) effects_.keep_alone(block, l, alone_);
     constexpr int words = kHistoryWords<Real> * W;
     std::array<std::int32_t, W> known;
     known.fill(-1);
     known[static_cast<std::size_t>(l)] = 0;
     std::array<Real, W> delta{};
+    const State<double>& state = alone_.state();
+    const double longer = options_.step / state.last_step(0);
     for (Index row = 0; row < tree_.shape.velocities; ++row) {
-      delta[static_cast<std::size_t>(l)] = static_cast<Real>(alone_.state().history(row, 0));
+      delta[static_cast<std::size_t>(l)] = static_cast<Real>(longer * state.history(row, 0));
       remember<W>(delta.data(), known.data(), block.past + row * words);
     }
     block.instances[l].displacements = 1;
@@ -437,7 +458,6 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     const StepReport report = alone_.step(static_cast<double>(block.instances[l].steps) * options_.step);
     InstanceRecord& instance = block.instances[l];
     instance.evaluations += report.evaluations;
-    instance.displacements = 0;
     if (!report.ok()) {
       instance.status = report.status;
       instance.slot = report.slot;
@@ -446,8 +466,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
     instance.rescued += 1;
     instance.steps += 1;
-    for (int k = 0; k < 2; ++k) block.pace[k * W + l] = static_cast<Real>(state.pace(0, k));
-    if constexpr (kEffects) keep_alone(block, l, report.substeps == 1);
+    keep_alone(block, l);
     for (Index row = 0; row < q_.rows(); ++row) L::set_lane(q_(row), l, state.q(row));
     for (Index row = 0; row < p_.rows(); ++row) L::set_lane(p_(row), l, state.p(row));
     return true;

@@ -24,6 +24,11 @@ struct Energy {
   double total() const { return kinetic + potential; }
 };
 
+/// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading).
+struct EffectMemory {
+  std::span<double> excess_before, reading;
+};
+
 class Stepper {
  public:
   virtual ~Stepper();
@@ -49,13 +54,17 @@ class Stepper {
   virtual std::span<double> servo_targets() = 0;
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
   virtual std::span<double> friction_forces() = 0;
-  /// How contact point k ended the last step (EffectSweeps::contact).
+  /// What effects keep of the step taken last; written where it is that of another state. Empty without effects.
+  virtual EffectMemory effect_memory() = 0;
+  /// How contact point k ended the last step (EffectSweeps::contact), likewise.
   virtual double contact(Index k) const = 0;
+  virtual void set_contact(Index k, double contact) = 0;
   /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
   virtual std::vector<std::span<double>> memory() = 0;
 
-  /// v = M(q)^-1 p for the positions of the last refresh or step; at the end of a step with effects, p with their impulses taken half
-  /// at each end of it (kernels/effects/body_impulses.hpp). Returns that p.
+  /// The velocity of the motion at the positions of the last refresh or step, see engine/step/velocity.md: M(q)^-1 p where nothing acts
+  /// but potentials; else p is read with the effects' impulses taken half at each end of the last step, and what they hold is at rest.
+  /// Returns that p.
   virtual const Field<double>& read_velocity(const Field<double>& p, Field<double>& v) = 0;
   /// p = M(q) v.
   virtual void momentum_of(const Field<double>& v, Field<double>& p) = 0;

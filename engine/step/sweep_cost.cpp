@@ -99,9 +99,9 @@ class Bench {
     if constexpr (kEffects) {
       auto& effects = sweeps_.effects();
       if (effects.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects.plain_target().flat().begin());
-      const auto past = [&](Index row, int steps) { return state_.history(row, steps - 1); };
-      effects.begin(0.0, options_.step, state_.q, past, history_ >= 2, work_.delta);
-      sweeps_.begin(history_ > 0, 0);
+      for (Index row = 0; row < rate_.rows(); ++row) rate_(row) = state_.history(row, 0);
+      effects.begin(0.0, options_.step, state_.q, rate_, history_ > 0, false, work_.delta);
+      sweeps_.begin(0);
     }
     sweeps_.evaluate(true, report);
     momentum_map(model_.tree, model_.constants, work_.displacement, impulse_);  // as it was before it was summed over the subtrees

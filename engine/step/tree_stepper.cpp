@@ -8,6 +8,7 @@
 #include "engine/step/convergence.hpp"
 #include "engine/step/diagnosis.hpp"
 #include "engine/step/first_guess.hpp"
+#include "kernels/largest_turn.hpp"
 #include "kernels/momentum_update_map.hpp"
 #include "kernels/motion_map.hpp"
 
@@ -41,15 +42,15 @@ TreeStepper<kEffects>::TreeStepper(const Model& model, const Options& options, c
     : model_(model),
       options_(options),
       max_iterations_(options.max_iterations > 0 ? options.max_iterations : options.solver == Solver::newton ? 50 : 1000),
+      has_stages_(options.order != 2),
       sweeps_(model, options, plan),
       work_(sweeps_.work()),
-      effects_(sweeps_.effects()) {
+      effects_(sweeps_.effects()),
+      blows_(sweeps_, model.tree.shape.velocities) {
   check(options);
   last_good_.allocate(model.tree.shape);
-  if constexpr (kEffects) {
-    before_.allocate(model.tree.shape.velocities);
-    before_innovation_.allocate(model.tree.shape.velocities);
-  }
+  before_.allocate(model.tree.shape.velocities);
+  if constexpr (kEffects) before_innovation_.allocate(model.tree.shape.velocities);
 }
 
 template <bool kEffects>
@@ -57,14 +58,18 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
   StepReport report;
   time_ = time;
   effect_work_ = {};
-  report.status = solve(state, history, h, report);
-  if (report.ok()) {
-    finish(state, history, h, another);
-    return report;
-  }
-  // The whole step failed: two halves, each split again if need be, from the state as it was.
-  last_good_ = state;
+  bool bounces = false;
+  if constexpr (kEffects) bounces = effects_.plan().bounces;
+  if (bounces) last_good_ = state;  // parts of the step may be taken before one fails
   const int history_before = history;
+  report.status = advance(state, history, h, another, report);
+  if (report.ok()) return report;
+  // The whole step failed: two halves, each split again if need be, from the state as it was.
+  if (bounces) {
+    restore(state);
+  } else {
+    last_good_ = state;
+  }
   history = 0;
   report.substeps = 0;
   if (halves(state, history, h, 1, report)) {
@@ -73,20 +78,110 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
     return report;
   }
   report.residual = failed_residual_;
-  state = last_good_;
+  restore(state);
   history = history_before;
+  return report;
+}
+
+/// The state at the beginning of the step.
+template <bool kEffects>
+void TreeStepper<kEffects>::restore(State<double>& state) {
+  state = last_good_;
   effect_work_ = {};
   sweeps_.refresh(state.q);
-  return report;
+}
+
+template <bool kEffects>
+StepStatus TreeStepper<kEffects>::advance(State<double>& state, int& history, double h, bool another, StepReport& report) {
+  if constexpr (kEffects) {
+    if (effects_.plan().bounces) return advance_with_blows(state, history, h, report);
+  }
+  const StepStatus status = solve(state, history, h, report);
+  if (status == StepStatus::converged) finish(state, history, h, another);
+  return status;
+}
+
+/// A step in parts, from one blow on a limit to the next.
+template <bool kEffects>
+StepStatus TreeStepper<kEffects>::advance_with_blows(State<double>& state, int& history, double h, StepReport& report)
+  requires kEffects
+{
+  constexpr double kNothingLeft = 1e-12;
+  if (state.last_step(0) == 0) strike(state, h, false);
+  double left = h;
+  for (int blows = 0; left > kNothingLeft * h; ++blows) {
+    passable_ = blows < kMostBlows;
+    StepStatus status = solve(state, history, left, report);
+    if (status != StepStatus::converged) return status;
+    double part = left;
+    if (passable_ && blows_.passed(state) > 0) part = time_of_blow(state, left, report);
+    if (part == 0) {
+      // no such time is found: the joint stops at its limit
+      passable_ = false;
+      status = solve(state, 0, left, report);
+      if (status != StepStatus::converged) return status;
+      part = left;
+    }
+    finish(state, history, part, false);
+    if (part < left || blows > 0) history = 0;
+    left -= part;
+  }
+  return StepStatus::converged;
+}
+
+/// When within h a joint that bounces meets its limit first; the step to there is the solution found last. 0: not found.
+template <bool kEffects>
+double TreeStepper<kEffects>::time_of_blow(State<double>& state, double h, StepReport& report)
+  requires kEffects
+{
+  constexpr int kMostTrials = 40;
+  constexpr double kMet = 1e-13;  // [rad, m]
+  double late = h, passed_late = blows_.passed(state);
+  std::ranges::fill(work_.delta.flat(), 0.0);
+  double early = 0, passed_early = blows_.passed(state);
+  double t = h, passed = passed_late;
+  for (int trial = 0, side = 0; trial < kMostTrials; ++trial) {
+    t = (early * passed_late - late * passed_early) / (passed_late - passed_early);
+    if (!(t > early && t < late)) break;
+    if (solve(state, 0, t, report) != StepStatus::converged) return 0;
+    passed = blows_.passed(state);
+    if (std::abs(passed) <= kMet) return t;
+    if (passed > 0) {
+      late = t;
+      passed_late = passed;
+      if (side > 0) passed_early /= 2;
+      side = 1;
+    } else {
+      early = t;
+      passed_early = passed;
+      if (side < 0) passed_late /= 2;
+      side = -1;
+    }
+  }
+  return std::abs(passed) <= 0.1 * kAtLimit && t > 0 && t <= h ? t : 0;
+}
+
+/// Blows at a state, the last step of which was one of h. Afterwards the displacement of that step is the one that the velocity after the
+/// blows would have made of it: what works along the mean of both finds it there. Returns whether there was one.
+template <bool kEffects>
+bool TreeStepper<kEffects>::strike(State<double>& state, double h, bool arrived)
+  requires kEffects
+{
+  if (effects_.plan().effects.limits.empty() || !blows_.met(state)) return false;
+  bool struck = false;
+  effect_work_.limits += blows_.strike(state, arrived, struck);
+  if (!struck) return false;
+  for (Index row = 0; row < before_.rows(); ++row) state.history(row, 0) = h * blows_.velocity()(row);
+  state.last_step(0) = h;
+  return true;
 }
 
 template <bool kEffects>
 bool TreeStepper<kEffects>::halves(State<double>& state, int& history, double h, int depth, StepReport& report) {
   if (depth > options_.max_splits) return false;
   for (int half = 0; half < 2; ++half) {
-    report.status = solve(state, 0, h / 2, report);
+    report.status = advance(state, history, h / 2, false, report);
     if (report.ok()) {
-      finish(state, history, h / 2, false);
       report.substeps += 1;
     } else if (!halves(state, history, h / 2, depth + 1, report)) {
       return false;
@@ -110,20 +205,26 @@ double TreeStepper<kEffects>::fall(double h) const {
 }
 
 template <bool kEffects>
-void TreeStepper<kEffects>::begin_effects(const State<double>& state, int history, double h)
+void TreeStepper<kEffects>::begin_effects(const State<double>& state, double h)
   requires kEffects
 {
   if (effects_.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects_.plain_target().flat().begin());
-  const auto past = [&](Index row, int steps) { return state.history(row, steps - 1); };
-  effects_.begin(time_ + 0.5 * h, h, state.q, past, history >= 2, work_.delta);
-  if (history > 0) {
-    for (Index row = 0; row < before_.rows(); ++row) before_(row) = state.history(row, 0);
+  if (state.last_step(0) != 0) {
+    know_before(state, h);
   } else {
     sweeps_.velocity_of(state.p, before_);
     for (double& value : before_.flat()) value *= h;
   }
-  known_ = history > 0;
-  sweeps_.begin(known_, fall(h));
+  effects_.begin(time_ + 0.5 * h, h, state.q, before_, state.last_step(0) != 0, passable_, work_.delta);
+  sweeps_.begin(fall(h));
+}
+
+/// before_: displacement of the step before; of a step of its own length, had it been as long as this one.
+template <bool kEffects>
+void TreeStepper<kEffects>::know_before(const State<double>& state, double h) {
+  if (has_stages_) return;  // it is there since that step ended
+  const double longer = h / state.last_step(0);
+  for (Index row = 0; row < before_.rows(); ++row) before_(row) = longer * state.history(row, 0);
 }
 
 template <bool kEffects>
@@ -139,6 +240,17 @@ std::span<double> TreeStepper<kEffects>::friction_forces() {
 }
 
 template <bool kEffects>
+EffectMemory TreeStepper<kEffects>::effect_memory() {
+  if constexpr (kEffects) return {effects_.excess_before().flat(), effects_.reading().flat()};
+  return {};
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::set_contact([[maybe_unused]] Index k, [[maybe_unused]] double contact) {
+  if constexpr (kEffects) effects_.set_contact(k, contact);
+}
+
+template <bool kEffects>
 double TreeStepper<kEffects>::contact([[maybe_unused]] Index k) const {
   if constexpr (kEffects) return effects_.contact(k);
   return 0;
@@ -151,6 +263,7 @@ std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
     const auto of_effects = effects_.memory();
     kept.assign(of_effects.begin(), of_effects.end());
   }
+  if (has_stages_) kept.push_back(before_.flat());
   if (sweeps_.holds()) {
     const auto factor = sweeps_.factor_memory();
     kept.insert(kept.end(), {held_.numbers(), factor[0], factor[1], factor[2]});
@@ -171,42 +284,29 @@ bool TreeStepper<kEffects>::revise_effects(bool settled, bool one_by_one)
 template <bool kEffects>
 StepStatus TreeStepper<kEffects>::solve(State<double>& state, int history, double h, StepReport& report) {
   const StepStatus status = find_root(state, history, h, report);
-  if (status != StepStatus::converged || !gains_energy(state, h)) return status;
-  sweeps_.complete();
-  report.slot = fastest_body(model_, sweeps_.constants(), work_);
-  return StepStatus::gains_energy;
-}
-
-/// Discrete energy, -dL_d/dh, is kinetic energy of the mean motion plus the mean potential of both ends: between neighbouring steps it
-/// changes by what is compared here. Nothing is known of the step before the first.
-template <bool kEffects>
-bool TreeStepper<kEffects>::gains_energy(const State<double>& state, double h) {
+  if (status != StepStatus::converged) return status;
   displacement_map(model_.tree, work_.motion, work_.delta);
-  kinetic_ = momentum_energy_ / (h * h);
-  const double before = state.pace(0, 0);
-  force_work_ = sweeps_.force_work(all_slots(model_.tree));
-  double gain = kinetic_ - before - 0.5 * (state.pace(0, 1) + force_work_);
-  if constexpr (kEffects) {
-    solved_work_ = effects_.work(sweeps_.left(), work_.delta, before_, known_);
-    // forces that nearly balance leave less kinetic energy than their works, taken half a step apart, differ by
-    double activity = effects_.activity(solved_work_, work_.motion, work_.delta) + sweeps_.effect_potential();
-    for (Index row = 0; row < model_.tree.shape.velocities; ++row) activity += std::abs(work_.force(row) * work_.delta(row));
-    gain -= activity;
+  if (gains_energy(state, history, h, report)) {
+    sweeps_.complete();
+    report.slot = fastest_body(model_, sweeps_.constants(), work_);
+    return StepStatus::gains_energy;
   }
-  const double most = kMostGain * std::max(kinetic_, before);
-  return gain > most && (options_.order == 2 || gain - push() > most);
+  return StepStatus::converged;
 }
 
-/// Kinetic energy that the forces give in a whole step to what is at rest: neighbouring sub-steps of different length differ by so much
-/// where the motion turns back.
+/// Whether the solution is another root than the motion's; see convergence.hpp. Nothing is known of the step before the first.
 template <bool kEffects>
-double TreeStepper<kEffects>::push() {
-  if (sweeps_.one_pass()) std::swap(work_.innovation, work_.residual);  // what the solve left is still needed
-  sweeps_.velocity_of(work_.force, work_.increment);
-  if (sweeps_.one_pass()) std::swap(work_.innovation, work_.residual);
-  double sum = 0;
-  for (Index row = 0; row < model_.tree.shape.velocities; ++row) sum += work_.force(row) * work_.increment(row);
-  return 0.5 * options_.step * options_.step * sum;
+bool TreeStepper<kEffects>::gains_energy(const State<double>& state, int history, double h, StepReport& report) {
+  if (least_w_ > kFreeCosine || state.last_step(0) == 0) return false;
+  if (history > 0 && options_.guess == FirstGuess::extrapolation) {
+    const Extrapolation guess = extrapolation(state.history, history);
+    const double corrected = largest_turn(model_.tree, sweeps_.constants(), work_.delta,
+                                          [&](Index row) { return extrapolated(guess, state.history, row); });
+    if (corrected < kFreeCorrection) return false;
+  }
+  if (!kEffects) know_before(state, h);
+  const EnergyStep energy = sweeps_.energy_step(before_, has_stages_ ? state.last_step(0) : h, h, report);
+  return energy.now - energy.before - energy.work > kMostGain * std::max(energy.now, energy.before);
 }
 
 /// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so;
@@ -263,9 +363,7 @@ Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int hist
   fresh = history == 0 || !sweeps_.holds() || !held_.serves(options_.tolerance);
   if (to_end_ != 0) {
     const Extrapolation guess = extrapolation_after(work_.delta, state.history, history);
-    const Evaluated now = sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report);
-    state.pace(0, 1) = 0.5 * (force_work_ + now.work);
-    return now;
+    return sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report);
   }
   if (!kEffects && options_.guess == FirstGuess::extrapolation && history > 0 && sweeps_.mimics().empty()) {
     // of each part of the tree when its turn comes
@@ -274,7 +372,7 @@ Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int hist
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(options_.guess, model_, state, history, h, sweeps_);
   spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
-  if constexpr (kEffects) begin_effects(state, history, h);
+  if constexpr (kEffects) begin_effects(state, h);
   return sweeps_.evaluate(fresh, report);
 }
 
@@ -300,7 +398,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
     const double relative = now.scale > 0 ? std::sqrt(0.5 * norm / now.scale) : std::sqrt(norm);
     if (status == StepStatus::converged) {
       held_.end(relative, at_floor, !held || report.factorisations > factors_before);
-      momentum_energy_ = now.energy;
+      least_w_ = now.least_w;
       report.residual = std::max(report.residual, relative);
     } else {
       held_.drop();
@@ -396,28 +494,31 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
 /// The new state, from a displacement that solves the step.
 template <bool kEffects>
 void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, bool another) {
+  EffectWork<double> work;
   if constexpr (kEffects) {
+    work = effects_.work(sweeps_.left(), work_.delta, before_, state.last_step(0) == h);
     if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
   history = std::min(history + 1, kHistory);
+  state.last_step(0) = h;
   if (!kEffects && another && sweeps_.can_go_on() && options_.guess == FirstGuess::extrapolation) {
-    state.pace(0, 0) = kinetic_;
     to_end_ = h;
     return;
   }
-  state.pace(0, 1) = 0.5 * (force_work_ + sweeps_.arrive(h, state));
+  sweeps_.arrive(h, state);
   if constexpr (kEffects) {
-    // an impact may take in one step what the next gives back
-    state.pace(0, 0) = std::max(kinetic_, kImpactMemory * state.pace(0, 0));
-    solved_work_.ground -= effects_.ground_stored();
-    effect_work_.add(solved_work_);
+    work.ground -= effects_.ground_stored();
+    effect_work_.add(work);
     time_ += h;
     for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.increment(row);
-  } else {
-    state.pace(0, 0) = kinetic_;
   }
   fold_mimics(sweeps_.mimics(), state.p);
+  if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
+  if constexpr (kEffects) {
+    sweeps_.end_reading();
+    if (strike(state, h, true)) history = 1;
+  }
 }
 
 template <bool kEffects>

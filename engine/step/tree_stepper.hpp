@@ -13,10 +13,14 @@
 // Effects (effect_sweeps.hpp) act after momentum_map and on the target, are part of the factor, and have their states - sticks, slides,
 // at a limit - revised between corrections. Compiled with them and without (kEffects): a step without asks for none.
 //
-// The equation may have other roots, far from the motion, once a step is too large for it. Whoever lands on one gains energy out of
-// nothing: kinetic energy of the mean motion minus the work of the forces is compared with the step before.
+// The equation may have other roots, far from the motion, once a step is too large for it (convergence.hpp). Whoever lands on one gains
+// energy out of nothing: where a step turns bodies by much and its solution lies far from the first guess, kinetic energy of the mean
+// motion minus the work of the impulses at its beginning is compared with the step before. Other steps are not asked.
 #pragma once
 
+#include <type_traits>
+
+#include "engine/step/blows.hpp"
 #include "engine/step/held_factor.hpp"
 #include "engine/step/stepper.hpp"
 #include "engine/step/tree_sweeps.hpp"
@@ -36,7 +40,9 @@ class TreeStepper final : public Stepper {
   const EffectWork<double>& effect_work() const override { return effect_work_; }
   std::span<double> servo_targets() override;
   std::span<double> friction_forces() override;
+  EffectMemory effect_memory() override;
   double contact(Index k) const override;
+  void set_contact(Index k, double contact) override;
   std::vector<std::span<double>> memory() override;
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v) override { return sweeps_.read_velocity(p, v); }
   void momentum_of(const Field<double>& v, Field<double>& p) override { sweeps_.momentum_of(v, p); }
@@ -45,16 +51,24 @@ class TreeStepper final : public Stepper {
 
  private:
   bool converged(const Evaluated& now, double norm, double h) const;
-  bool gains_energy(const State<double>& state, double h);
-  double push();
-  void begin_effects(const State<double>& state, int history, double h)
+  bool gains_energy(const State<double>& state, int history, double h, StepReport& report);
+  void begin_effects(const State<double>& state, double h)
     requires kEffects;
   bool revise_effects(bool settled, bool one_by_one)
     requires kEffects;
   void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
     requires kEffects;
+  void know_before(const State<double>& state, double h);
   double fall(double h) const;
   Evaluated first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report);
+  StepStatus advance(State<double>& state, int& history, double h, bool another, StepReport& report);
+  StepStatus advance_with_blows(State<double>& state, int& history, double h, StepReport& report)
+    requires kEffects;
+  double time_of_blow(State<double>& state, double h, StepReport& report)
+    requires kEffects;
+  bool strike(State<double>& state, double h, bool arrived)
+    requires kEffects;
+  void restore(State<double>& state);
   StepStatus solve(State<double>& state, int history, double h, StepReport& report);
   StepStatus find_root(State<double>& state, int history, double h, StepReport& report);
   bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
@@ -63,21 +77,21 @@ class TreeStepper final : public Stepper {
   const Model& model_;
   Options options_;
   int max_iterations_;
+  bool has_stages_;  // steps are sub-steps, of lengths that differ from one to the next
   TreeSweeps<kEffects> sweeps_;
   Workspace<double>& work_;
   EffectsIf<kEffects, double>& effects_;
   double enough_ = 0;           // squared energy norm of a residual that will do, beside the tolerance
-  double momentum_energy_ = 0;  // h^2 x kinetic energy of the mean motion, of the root found last
-  double kinetic_ = 0;          // the same in J
-  double force_work_ = 0;       // of the forces at the beginning along its displacement [J]
+  double least_w_ = 1;          // of the root found last: see displacement_down
   double to_end_ = 0;           // h of a step that is solved and left for the next one to end; else 0
   double failed_residual_ = 0;  // of the last solve that failed
-  EffectWork<double> effect_work_, solved_work_;  // of the whole step; of the root found last
-  Field<double> before_;             // displacement of the step before, as far as it is known [rad, m]
+  EffectWork<double> effect_work_;  // of the whole step
+  Field<double> before_;             // see know_before
   Field<double> before_innovation_;  // of approach_softly
   HeldFactor held_;
+  [[no_unique_address]] std::conditional_t<kEffects, Blows, NoBlows> blows_;
+  bool passable_ = false;  // see limits.hpp
   double time_ = 0;
-  bool known_ = false;  // the last step is one of this stepper
   State<double> last_good_;
 };
 

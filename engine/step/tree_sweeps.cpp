@@ -10,6 +10,7 @@
 #include "kernels/articulated_inertia_up.hpp"
 #include "kernels/displacement_down.hpp"
 #include "kernels/gravity.hpp"
+#include "kernels/impulse_up.hpp"
 #include "kernels/increment_down.hpp"
 #include "kernels/innovation_up.hpp"
 #include "kernels/momentum_map.hpp"
@@ -100,19 +101,15 @@ void TreeSweeps<kEffects>::arrive_down(Slots part, State<double>& state) {
   place(state.q, part);
 }
 
-/// Forces on some joints and momenta there; seen: seen_ of the step that ends. Returns the work of the forces along its displacement.
+/// Forces on some joints and momenta there; seen: seen_ of the step that ends.
 template <bool kEffects>
-double TreeSweeps<kEffects>::arrive_up(Slots part, double h, bool seen, State<double>& state) {
+void TreeSweeps<kEffects>::arrive_up(Slots part, double h, bool seen, State<double>& state) {
   forces(part);
   if (seen) {
     momentum_end_map(model_.tree, h, work_.increment, work_.force, part, state.p);
   } else {
     momentum_update_map(model_.tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, state.p);
   }
-  const Slots rows = velocities(model_.tree, part);
-  double sum = 0;
-  for (Index row = rows.begin; row < rows.end; ++row) sum += work_.force(row) * state.history(row, 0);
-  return sum;
 }
 
 template <bool kEffects>
@@ -122,28 +119,17 @@ void TreeSweeps<kEffects>::advance(Slots part, State<double>& state) {
 }
 
 template <bool kEffects>
-double TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
+void TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
   if (!ties_.empty()) {
     advance(all_slots(model_.tree), state);
     for (const Mimic& mimic : mimics()) state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
   if (!seen_) complete();
-  const Evaluated end = tree_.run(
+  tree_.run(
       true, false, [&](Slots part, Evaluated&) { arrive_down(part, state); },
-      [&](Slots part, Evaluated& sum) { sum.work += arrive_up(part, h, seen_, state); });
+      [&](Slots part, Evaluated&) { arrive_up(part, h, seen_, state); });
   placed_ = true;
   find_potentials(state.q);
-  return end.work;
-}
-
-template <bool kEffects>
-double TreeSweeps<kEffects>::force_work(Slots part) const {
-  const Slots rows = velocities(model_.tree, part);
-  double sum = 0;
-  for_bodies<double>(rows.begin, rows.end, [&](auto bodies, Index row) {
-    sum += summed(bodies, gather_row(bodies, work_.force, row) * gather_row(bodies, work_.delta, row));
-  });
-  return sum;
 }
 
 template <bool kEffects>
@@ -240,7 +226,7 @@ void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated& now) {
   if constexpr (kEffects) {
     const EffectPlan& plan = effects_.plan();
     if (plan.bodies) {
-      if (guess_points_) effects_.guess_points(work_.displacement, known_);
+      if (guess_points_) effects_.guess_points(work_.displacement);
       guess_points_ = false;
       effects_.bodies(*constants_, work_.displacement, work_.impulse);
     }
@@ -255,9 +241,8 @@ void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated& now) {
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::begin(bool known, double scale) {
+void TreeSweeps<kEffects>::begin(double scale) {
   guess_points_ = true;
-  known_ = known;
   effect_scale_ = scale;
 }
 
@@ -389,8 +374,8 @@ Evaluated TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, State<doubl
     extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  const auto arrival = [&](Slots part, Evaluated& sum) {
-    sum.work += arrive_up(part, h_before, true, state);
+  const auto arrival = [&](Slots part, Evaluated&) {
+    arrive_up(part, h_before, true, state);
     momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target);
   };
   const Evaluated now = evaluate_motions(report, true, fresh, motions, arrival);
@@ -446,12 +431,44 @@ bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, 
   return norm <= unit * unit * sum;
 }
 
+/// h x momenta at the beginning of a step of displacement work_.delta from where the bodies are; returns h^2 x its kinetic energy.
 template <bool kEffects>
-void TreeSweeps<kEffects>::factor_mass() {
+double TreeSweeps<kEffects>::momenta_of_delta(Field<double>& momenta) {
+  motion_map(model_.tree, *constants_, work_.delta, work_.motion);
+  displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
+  double energy = momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
+  impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, momenta);
+  if constexpr (kEffects) {
+    add_armature<double>(effects_.plan().effects.armature, work_.delta, momenta);
+    energy += armature_energy<double>(effects_.plan().effects.armature, work_.delta);
+  }
+  return energy;
+}
+
+template <bool kEffects>
+EnergyStep TreeSweeps<kEffects>::energy_step(const Field<double>& before, double h_before, double h, StepReport& report) {
   place_all();
-  effects_.with_rotors([&](const auto& rotors) {
-    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), rotors);
-  });
+  EnergyStep step;
+  Field<double>& solution = work_.applied;
+  std::ranges::copy(work_.delta.flat(), solution.flat().begin());
+  const auto along_mean = [&](double momentum, Index row) { return 0.5 * momentum * (solution(row) / h + before(row) / h_before); };
+  step.now = momenta_of_delta(work_.increment) / (h * h);
+  for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.increment(row) / h, row);
+  // the step before, seen from its end: the same step taken back, whose momenta point the other way
+  for (Index row = 0; row < before.rows(); ++row) work_.delta(row) = -before(row);
+  step.before = momenta_of_delta(work_.increment) / (h_before * h_before);
+  for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.increment(row) / h_before, row);
+  // all as it was
+  std::ranges::copy(solution.flat(), work_.delta.flat().begin());
+  evaluate(false, report);
+  return step;
+}
+
+template <bool kEffects>
+template <class Added>
+void TreeSweeps<kEffects>::factor_mass(const Added& added) {
+  place_all();
+  articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), added);
   tie_rates(mass_gains());
 }
 
@@ -464,7 +481,7 @@ void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<doub
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::velocity_of(const Field<double>& p, Field<double>& v) {
-  factor_mass();
+  effects_.with_rotors([&](const auto& rotors) { factor_mass(rotors); });
   apply_mass_inverse(p, v);
 }
 
@@ -482,9 +499,10 @@ template <bool kEffects>
 const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p, Field<double>& v) {
   if constexpr (kEffects) {
     read_ = p;
-    effects_.even_out(*constants_, work_.placement, work_.impulse, work_.increment, read_);
+    effects_.begin_reading(read_);
     fold_mimics(ties_.mimics(), read_);
-    velocity_of(read_, v);
+    effects_.with_reading([&](const auto& added) { factor_mass(added); });
+    apply_mass_inverse(read_, v);
     return read_;
   } else {
     velocity_of(p, v);

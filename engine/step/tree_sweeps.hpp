@@ -40,15 +40,18 @@ struct Evaluated {
   double plain = 0;    // |h r|^2
   double norm = 0;     // squared energy norm of the residual
   double scale = 0;    // what a residual is compared with: energy, with effects also what gravity gives in a step
-  double work = 0;     // of the forces at its beginning along the displacement of the step that ended there, if one did [J]
   bool usable() const { return least_w > 0 && std::isfinite(norm) && std::isfinite(plain) && std::isfinite(energy); }
   /// What another part of the tree adds.
   void add(const Evaluated& part) {
     least_w = std::min(least_w, part.least_w);
     energy += part.energy;
     norm += part.norm;
-    work += part.work;
   }
+};
+
+/// Kinetic energies of the mean motions of two neighbouring steps, and the work of the impulses between them [J].
+struct EnergyStep {
+  double before = 0, now = 0, work = 0;
 };
 
 /// kEffects: with those of the plan, beside gravity.
@@ -67,13 +70,10 @@ class TreeSweeps {
 
   /// Placements, forces and potentials at q.
   void refresh(const Field<double>& q);
-  /// The same at the end of a step of h, whose displacement joins the history: positions, momenta. Returns the work of the forces there
-  /// along the displacement [J].
-  double arrive(double h, State<double>& state);
+  /// The same at the end of a step of h, whose displacement joins the history: positions, momenta.
+  void arrive(double h, State<double>& state);
   /// Whether the end of a step whose last evaluation this was and the first evaluation of the next can go over each branch together.
   bool can_go_on() const { return seen_; }
-  /// Work of the forces of potentials and of those applied along delta, of some bodies [J].
-  double force_work(Slots part) const;
   /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
   double potential() const { return potential_; }
   double effect_potential() const { return effect_potential_; }
@@ -83,8 +83,8 @@ class TreeSweeps {
 
   /// Before all else of a step from these positions, which must stay where they are until it is over.
   void start(const Field<double>& q) { q_ = &q; }
-  /// Before the evaluations of a step with effects. known: the step before is one of these sweeps; scale: see Evaluated.
-  void begin(bool known, double scale);
+  /// Before the evaluations of a step with effects. scale: see Evaluated.
+  void begin(double scale);
   /// fresh: with a fresh factor, else with the one there is; see holds.
   Evaluated evaluate(bool fresh, StepReport& report);
   /// The same from a guess of delta, momentum_target and all.
@@ -110,6 +110,10 @@ class TreeSweeps {
   /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
   /// beside the motion, or beside what gravity alone would do to it where all is at rest (fall).
   bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons);
+  /// What the step solved last, of h, does to the energy of the step before, of h_before and with the displacement `before`. Between the
+  /// two acts an impulse, whatever it is made of: the momentum at the beginning of the one less that at the end of the other, which are
+  /// made anew from their displacements. It works along the mean of both velocities, to second order.
+  EnergyStep energy_step(const Field<double>& before, double h_before, double h, StepReport& report);
 
   /// Whether the factor outlasts a step: reading velocities then has one of its own.
   bool holds() const { return holds_; }
@@ -122,7 +126,14 @@ class TreeSweeps {
   void velocity_of(const Field<double>& p, Field<double>& v);
   void apply_mass_inverse(const Field<double>& p, Field<double>& v);
   void momentum_of(const Field<double>& v, Field<double>& p);
+  /// See Stepper.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
+  /// At the end of a step with effects: what velocities are read from beside p.
+  void end_reading()
+    requires kEffects
+  {
+    effects_.end_reading(*constants_, work_.placement, true, work_.impulse, work_.increment);
+  }
 
  private:
   void place(const Field<double>& q, Slots part);
@@ -131,7 +142,7 @@ class TreeSweeps {
   void find_potentials(const Field<double>& q);
   void advance(Slots part, State<double>& state);
   void arrive_down(Slots part, State<double>& state);
-  double arrive_up(Slots part, double h, bool seen, State<double>& state);
+  void arrive_up(Slots part, double h, bool seen, State<double>& state);
   template <class Motions, class BeforeUp>
   Evaluated evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions, const BeforeUp& before_up);
   template <class Added>
@@ -140,10 +151,12 @@ class TreeSweeps {
   void forces(Slots part);
   void pass_up(Evaluated& now, bool fresh);
   void factor();
-  void factor_mass();
+  template <class Added>
+  void factor_mass(const Added& added);
   void tie_rates(const Gains<double>& gains);
   double pass_residual();
   void pass_down();
+  double momenta_of_delta(Field<double>& momenta);
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
   Gains<double> mass_gains() { return holds_ ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
@@ -162,7 +175,6 @@ class TreeSweeps {
   double potential_ = 0, effect_potential_ = 0;
   double effect_scale_ = 0;
   bool guess_points_ = false;  // no evaluation of this solve has been made yet
-  bool known_ = false;
   std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;

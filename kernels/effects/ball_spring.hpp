@@ -84,17 +84,6 @@ void ball_spring_end_map(std::span<const BallSpring> springs, const Tree& tree, 
   }
 }
 
-/// Work over a displacement from q, to second order of its turn [J].
-template <class S>
-S ball_spring_work(std::span<const BallSpring> springs, const Tree& tree, const Field<S>& q, const Field<S, 7>& motion,
-                   const Field<S>& delta) {
-  S sum(0.0);
-  for (const BallSpring& spring : springs) {
-    sum = sum - dot(ball_pull(spring, tree, q, motion).tau, load3<S>(delta, tree.first_v(spring.slot)));
-  }
-  return sum;
-}
-
 template <class S>
 S ball_spring_potential(std::span<const BallSpring> springs, const Tree& tree, const Field<S>& q) {
   S sum(0.0);

@@ -6,10 +6,6 @@
 //   the rest at the end, at a + D            D = displacement of the point, body frame at k
 //   Jacobian                                 K_i += s h^2 J_a^T H R J_c,    H = -dF/dD,  J_c = [-c^ 1],  R of dT
 //
-// For people, who take the velocities of a state to be M^-1 p, what lasts of the impulses of the beginning is moved half to the end
-// (`even`): p of a robot at rest, whose ground pushes at the beginning of a step and whose weight pulls half at its end, would seem to
-// move by h g / 2.
-//
 // Both shares as one wrench in space, in the body frame at k, are `given`: summed over subtrees they turn the impulses of the beginning
 // of a step into those of its end (momentum_update_map). H is taken about the point c that F's law looks at.
 //
@@ -30,8 +26,6 @@ namespace linden {
   FIELD(Scalar, pose, 12, slots, "T: body -> world at q; rotation row by row, shift [m]")                \
   FIELD(Scalar, given, 6, slots, "h x impulses of both ends, body frame at k; moment, force")            \
   FIELD(Scalar, uneven, 6, slots, "h x impulses of the beginning less half of both ends, likewise")      \
-  FIELD(Scalar, last, 6, slots, "uneven impulse of the last step")                                       \
-  FIELD(Scalar, even, 6, slots, "what lasted of it: what velocities are read with")                      \
   FIELD(Scalar, pull, 36, slots, "what K grows by, as a Mat6; zero of bodies that no effect touches")
 
 template <class Scalar>

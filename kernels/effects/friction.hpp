@@ -52,14 +52,14 @@ void guess_friction(Frictions<S>& frictions, const S& h, double creep, const Fie
   }
 }
 
-/// The modes to begin a step with: joints that held in the last one, where it is known, hold.
-template <class S, class Past, class Mask>
-void begin_friction(Frictions<S>& frictions, const Past& past, const Mask& known, Field<S>& delta) {
+/// The modes to begin a step with: joints that held in the last one, where its displacement `before` is known, hold.
+template <class S, class Mask>
+void begin_friction(Frictions<S>& frictions, const Field<S>& before, const Mask& known, Field<S>& delta) {
   const S zero(0.0);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
     const Index row = frictions.entries[static_cast<std::size_t>(k)].row;
     S& d = delta(row);
-    d = select(known && past(row, 1) == zero, zero, d);
+    d = select(known && before(row) == zero, zero, d);
     frictions.mode(k) = sign_of(d);
   }
 }

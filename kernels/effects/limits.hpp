@@ -4,18 +4,24 @@
 //   open    (mode = 0)      lowest <= delta <= highest
 //   closed  (mode = 1, -1)  delta = highest or lowest exactly, as long as the limit has to push
 //
-//   highest = max(upper - q^k, 0)     or, after an impact with restitution e:  -e delta_in, delta_in the step before it
+//   highest = max(upper - q^k, 0),  lowest = min(lower - q^k, 0)
 //
 // No penalty: a closed joint is taken out of the solve, as one that friction holds. A joint never passes its limit by more than the
-// solver's rounding; one that starts beyond it may come back but go no further. The step that meets the limit ends on it; the one
-// after gives back e times the displacement of the step before (Newton's law of impact), which a batch remembers in single precision.
+// solver's rounding; one that starts beyond it may come back but go no further. Without restitution the step that meets the limit ends
+// on it, and the joint rests there.
+//
+// With restitution e > 0 a step may be `passable`: joints that bounce and are not at their limit yet go through it, so that the solver
+// can find when the first of them meets it and strike there (engine/step/blows.hpp):
+//
+//   v_n <- -e v_n,   p <- p - (1 + e) v_n / (M^-1)_nn  in the joint's row          Newton's law of impact
 //
 // units   [rad, m]; e without
-// energy  takes -impulse x worked / h
+// energy  takes -impulse x worked / h; a blow 1/2 (1 - e^2) v_n^2 / (M^-1)_nn
 // cost    some 8 operations an entry and evaluation
 // source  Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988)
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "kernels/effects/friction.hpp"
@@ -29,33 +35,32 @@ struct Limits {
   Field<S> mode;             // of each
 };
 
-/// Impacts slower than this many times h^2 do not bounce, or a joint at rest on its limit would hum [rad/s^2, m/s^2].
-inline constexpr double kStillAcceleration = 50;
+/// A joint this near to its limit is at it [rad, m].
+inline constexpr double kAtLimit = 1e-9;
 
-/// Room for the displacement, and the modes that its first guess suggests, moved into the limits. past(row, k): displacement k steps
-/// before, where two are `known`.
-template <class S, class Past, class Mask>
-void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const S& h, const Field<S>& q, const Past& past, const Mask& known,
+/// What bounces does so from this approach speed on; slower it comes to rest [rad/s, m/s].
+inline constexpr double kLeastBounce = 1e-4;
+
+/// Room for the displacement, and the modes that its first guess suggests, moved into the limits. before: displacement of the last step,
+/// where that is `known`. passable: see above.
+template <class S, class Mask>
+void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const Field<S>& q, const Field<S>& before, const Mask& known, bool passable,
                   Field<S>& delta) {
   using std::max;
   using std::min;
-  const S zero(0.0), one(1.0), slack = as<S>(1e-9);
-  const S slow = h * h * as<S>(kStillAcceleration);
+  const S zero(0.0), one(1.0), slack = as<S>(kAtLimit);
+  const S anywhere = as<S>(std::numeric_limits<double>::infinity());
   for (Index k = 0; k < limits.mode.rows(); ++k) {
     const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
     const S up = as<S>(limit.upper) - q(q_row(limit.row)), down = as<S>(limit.lower) - q(q_row(limit.row));
-    S highest = max(up, zero), lowest = min(down, zero);
-    if (limit.restitution > 0) {
-      const S last = past(limit.row, 1), before_last = past(limit.row, 2);
-      const S rise = max(last, before_last), fall = min(last, before_last);
-      highest = select(known && up < slack && rise > slow, as<S>(-limit.restitution) * rise, highest);
-      lowest = select(known && down > -slack && fall < -slow, as<S>(-limit.restitution) * fall, lowest);
-    }
+    const bool through = passable && limit.restitution > 0;
+    const S highest = through ? select(up > slack, anywhere, max(up, zero)) : max(up, zero);
+    const S lowest = through ? select(down < -slack, -anywhere, min(down, zero)) : min(down, zero);
     limits.highest(k) = highest;
     limits.lowest(k) = lowest;
     S& d = delta(limit.row);
     // a joint that rested on its limit rests on
-    const auto rests = known && past(limit.row, 1) == zero;
+    const auto rests = known && before(limit.row) == zero;
     limits.mode(k) = select(d >= highest || (rests && up < slack), one, select(d <= lowest || (rests && down > -slack), -one, zero));
     d = select(limits.mode(k) == one, highest, select(limits.mode(k) == -one, lowest, d));
     d = min(max(d, lowest), highest);
@@ -87,6 +92,21 @@ auto revise_limits(Limits<S>& limits, const Field<S>& residual, const Mask& sett
     limits.mode(k) = select(leaves, zero, select(above, one, select(below, -one, mode)));
   }
   return changed;
+}
+
+/// In which instances a joint that bounces was stopped by its limit instead: by a solution in which it did not rest there before.
+template <class S, class Mask>
+auto stopped_bounces(const Limits<S>& limits, const Field<S>& before, const Mask& known) {
+  const S zero(0.0), slack = as<S>(kAtLimit);
+  auto stopped = zero > S(1.0);
+  for (Index k = 0; k < limits.mode.rows(); ++k) {
+    const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
+    if (limit.restitution == 0) continue;
+    const S room = select(limits.mode(k) > zero, limits.highest(k), -limits.lowest(k));
+    const auto rests = known && before(limit.row) == zero && room <= slack;
+    stopped = stopped || (limits.mode(k) != zero && !rests);
+  }
+  return stopped;
 }
 
 /// What the limits took in a step [J].

@@ -29,17 +29,6 @@ void spring_map(std::span<const JointSpring> springs, const Field<Index>& q_row,
   }
 }
 
-/// Work over a displacement from q [J].
-template <class S>
-S spring_work(std::span<const JointSpring> springs, const Field<Index>& q_row, const Field<S>& q, const Field<S>& delta) {
-  S sum(0.0);
-  for (const JointSpring& spring : springs) {
-    const S& d = delta(spring.row);
-    sum = sum - as<S>(spring.stiffness) * (q(q_row(spring.row)) - as<S>(spring.rest) + S(0.5) * d) * d;
-  }
-  return sum;
-}
-
 template <class S>
 S spring_potential(std::span<const JointSpring> springs, const Field<Index>& q_row, const Field<S>& q) {
   S sum(0.0);
