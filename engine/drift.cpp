@@ -41,17 +41,22 @@ double LineFit::slope_error() const {
   return std::sqrt(left / static_cast<double>(points_ - 2) / xx_);
 }
 
-void EnergyDrift::add(double time, const Energy& energy) {
+void EnergyDrift::add(double time, const Energy& energy, double taken, double given) {
+  const double account = energy.total() + taken - given;
   if (samples_ == 0) {
     begin_ = time;
-    initial_ = lowest_ = highest_ = energy.total();
+    initial_ = lowest_ = highest_ = account;
+    first_potential_ = energy.potential;
   }
-  lowest_ = std::min(lowest_, energy.total());
-  highest_ = std::max(highest_, energy.total());
+  lowest_ = std::min(lowest_, account);
+  highest_ = std::max(highest_, account);
+  if (samples_ == 1) first_change_ = std::abs(account - initial_);
   scale_ = std::max(scale_, energy.kinetic);
+  exchanged_ = std::max({exchanged_, energy.kinetic, std::abs(energy.potential - first_potential_), std::abs(taken), std::abs(given)});
+  magnitude_ = std::max(magnitude_, energy.kinetic + std::abs(energy.potential) + std::abs(taken) + std::abs(given));
   const std::int64_t stretch = std::min<std::int64_t>(samples_ * kStretches / samples_expected_, kStretches - 1);
-  line_.add(time - begin_, energy.total() - initial_);
-  stretches_[static_cast<std::size_t>(stretch)].add(time - begin_, energy.total() - initial_);
+  line_.add(time - begin_, account - initial_);
+  stretches_[static_cast<std::size_t>(stretch)].add(time - begin_, account - initial_);
   samples_ += 1;
 }
 

@@ -42,7 +42,8 @@ class EnergyDrift {
   /// `samples`: how many are expected.
   explicit EnergyDrift(std::int64_t samples = 1) : samples_expected_(samples) {}
 
-  void add(double time, const Energy& energy);
+  /// Energy, and what effects took and gave since the first sample: H plus the one less the other is what stays.
+  void add(double time, const Energy& energy, double taken = 0, double given = 0);
 
   std::int64_t samples() const { return samples_; }
   double initial() const { return initial_; }         // H at the first sample [J]
@@ -50,12 +51,20 @@ class EnergyDrift {
   double slope() const { return line_.slope(); }      // [J/s]
   double slope_error() const;                         // [J/s]; NaN where the run is too short to tell
   double scale() const { return scale_; }             // [J]
+  /// Energy that went to and fro: the largest of kinetic energy, change of potential energy, what effects took, what they gave. Not zero
+  /// where things are held or come to rest [J].
+  double exchanged() const { return exchanged_; }
+  /// The largest sum of the account's parts: what rounding is relative to [J].
+  double magnitude() const { return magnitude_; }
+  /// How much of the band there was already between the first two samples [J].
+  double first_change() const { return first_change_; }
 
  private:
   static constexpr int kStretches = 20;
 
   std::int64_t samples_expected_, samples_ = 0;
   double begin_ = 0, initial_ = 0, lowest_ = 0, highest_ = 0, scale_ = 0;
+  double exchanged_ = 0, magnitude_ = 0, first_potential_ = 0, first_change_ = 0;
   LineFit line_;
   std::array<LineFit, kStretches> stretches_;
 };

@@ -38,6 +38,7 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
     good_q_ = state_.q;
     good_p_ = state_.p;
   }
+  watch_.emplace(*model_, plan_->effects);
   changed();
 }
 
@@ -145,7 +146,8 @@ StepReport Simulation::take_step(bool another) {
   const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, another);
   if (report.ok()) {
     ++steps_;
-    effect_work_.add(stepper_->effect_work());
+    effect_work_.add(stepper_->effect_account().work);
+    if (plan_->any()) watch_->add(stepper_->effect_account(), time());
   }
   return report;
 }

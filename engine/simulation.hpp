@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/passive_watch.hpp"
 #include "engine/step/stage_guess.hpp"
 #include "engine/step/stepper.hpp"
 #include "layout/effects.hpp"
@@ -81,7 +82,9 @@ class Simulation {
   Energy energy();
   /// What effects gave and took since the start, or since a checkpoint was loaded [J]. Total energy plus what was taken less what was given
   /// stays.
-  const EffectWork<double>& effect_work() const { return effect_work_; }
+  const EffectWork& effect_work() const { return effect_work_; }
+  /// Effects that gave energy although they can only take it, since then: none where all is well (engine/passive_watch.hpp).
+  const std::vector<PassiveGift>& passive_gifts() const { return watch_->gifts(); }
   Momentum momentum();
 
   /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step,
@@ -101,7 +104,8 @@ class Simulation {
   State<double> state_;
   std::unique_ptr<Stepper> stepper_;
   Field<double> rate_;
-  EffectWork<double> effect_work_;
+  EffectWork effect_work_;
+  std::optional<PassiveWatch> watch_;
   std::int64_t steps_ = 0;
   int history_ = 0;
   std::optional<StageGuess> stage_guess_;  // where a step has several sub-steps; none of them then looks at the state's history

@@ -136,13 +136,11 @@ class Execution {
     const Energy energy = simulation_.energy();
     figures_.taken = simulation_.effect_work().taken();
     figures_.given = simulation_.effect_work().given();
-    // what effects took is still in the account, what they gave is not
-    Energy account = energy;
-    account.potential += figures_.taken - figures_.given;
-    figures_.energy.add(simulation_.time(), account);
+    figures_.energy.add(simulation_.time(), energy, figures_.taken, figures_.given);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
     if (recorder_) recorder_->add(simulation_.time(), energy.total(), simulation_.positions());
-    if (!arguments_.plot.empty()) trace({simulation_.time(), account.total() - figures_.energy.initial()});
+    // what effects took is still in the account, what they gave is not
+    if (!arguments_.plot.empty()) trace({simulation_.time(), energy.total() + figures_.taken - figures_.given - figures_.energy.initial()});
     last_sample_ = figures_.run.steps;
     next_sample_ = figures_.run.steps + figures_.sampled_every;
   }
@@ -197,9 +195,7 @@ int run_command(const RunArguments& arguments) {
   const bool written = run.write_files();
   fmt::print("{}", run_summary(arguments, simulation, figures));
   std::fflush(stdout);
-  if (const std::string advice = energy_advice(arguments.options, figures.energy); !advice.empty()) {
-    fmt::print(stderr, "linden: warning: {}\n", advice);
-  }
+  for (const std::string& warning : energy_warnings(simulation, figures.energy)) fmt::print(stderr, "linden: warning: {}\n", printable(warning));
   if (!figures.complete()) fmt::print(stderr, "linden: {}\n", printable(ending(run, figures, arguments.options)));
   return figures.signal != 0 ? 128 + figures.signal : written && figures.complete() ? 0 : 1;
 }

@@ -42,11 +42,21 @@ std::string plural(std::int64_t number, const char* one, const char* more) { ret
 
 }  // namespace
 
-std::string energy_advice(const Options& options, const EnergyDrift& energy) {
-  constexpr double kTooFar = 0.05, kRounding = 1e-9;
-  if (!(energy.band() > kTooFar * energy.scale()) || energy.band() <= kRounding * std::abs(energy.initial())) return "";
-  return fmt::format("energy strays by {:.2g} % of the largest kinetic energy: the motion is not to be trusted; try --dt {:.3g}",
-                     100 * energy.band() / energy.scale(), options.step / 4);
+std::vector<std::string> energy_warnings(const Simulation& simulation, const EnergyDrift& energy) {
+  constexpr double kTooFar = 0.05, kRounding = 1e-9, kMostAtOnce = 0.9;
+  std::vector<std::string> warnings;
+  // where an effect gives what it can only take a smaller step is no cure
+  for (const PassiveGift& gift : simulation.passive_gifts()) warnings.push_back(describe(gift));
+  if (!warnings.empty()) return warnings;
+  // a potential is a sum of weights times heights, rounded at heights of a metre even where it comes to nothing
+  const auto& g = simulation.options().gravity;
+  const double weight = simulation.model().constants.subtree_mass(0) * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  if (!(energy.band() > kTooFar * energy.exchanged()) || energy.band() <= kRounding * (energy.magnitude() + weight)) return {};
+  const std::string strays = fmt::format("energy strays by {:.2g} % of what went to and fro", 100 * energy.band() / energy.exchanged());
+  if (energy.first_change() > kMostAtOnce * energy.band()) {
+    return {fmt::format("{}, nearly all of it at once at the start: look at how the scene begins", strays)};
+  }
+  return {fmt::format("{}: the motion is not to be trusted; try --dt {:.3g}", strays, simulation.options().step / 4)};
 }
 
 std::string run_summary(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
@@ -196,7 +206,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"failures", figures.failure.empty() ? 0 : 1},
       {"failure", if_given(figures.failure)},
       {"interrupted", figures.signal != 0},
-      {"advice", if_given(energy_advice(options, energy))},
+      {"advice", if_given(fmt::format("{}", fmt::join(energy_warnings(simulation, energy), "; ")))},
       {"warnings", model.warnings},
   };
 }

@@ -33,8 +33,9 @@ struct RunFigures {
   double simulated(double step) const { return static_cast<double>(run.steps) * step; }
 };
 
-/// What to say of a run whose energy strays so far that the motion cannot be trusted; empty for others.
-std::string energy_advice(const Options& options, const EnergyDrift& energy);
+/// What to say of a run whose motion cannot be trusted: passive effects that gave energy, each by name; or energy that strays far. None for
+/// others.
+std::vector<std::string> energy_warnings(const Simulation& simulation, const EnergyDrift& energy);
 
 std::string run_summary(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
 nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);

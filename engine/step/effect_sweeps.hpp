@@ -313,21 +313,29 @@ class EffectSweeps {
 
   /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
   /// last step; `known`: it was one of these sweeps and as long as this one.
-  EffectWork<S> work(const Field<S>& residual, const Field<S>& delta, const Field<S>& before, bool known) const {
-    EffectWork<S> work;
+  EffectAccount account(const Field<S>& residual, const Field<S>& delta, const Field<S>& before, bool known) const {
+    EffectAccount account;
+    EffectWork& work = account.work;
+    const auto into = [](double& sum, LeastLoss& least) {
+      return [&sum, &least](Index at, double loss) {
+        sum += loss;
+        least.see(at, loss);
+      };
+    };
     if (plan_.joints) {
-      work.damping = damping_loss(plan_.effects.damping, plan_.damping_share, h_, delta, before);
-      work.friction = friction_loss(frictions_, h_, residual, delta, before);
-      work.limits = limit_loss(limits_, h_, residual, delta, before);
+      damping_loss(plan_.effects.damping, plan_.damping_share, h_, delta, before, into(work.damping, account.damping));
+      friction_loss(frictions_, h_, residual, delta, before, into(work.friction, account.friction));
+      limit_loss(limits_, h_, residual, delta, before, into(work.limits, account.limits));
       work.servo = servo_work(servos_, plan_.q_row, h_, *q_, delta, before);
       work.torque = torque_work(plan_.effects.torques, force_, delta);
     }
     if (plan_.bodies) {
-      for (Index k = 0; k < drags_.loss.rows(); ++k) work.drag = work.drag + drags_.loss(k);
-      for (Index k = 0; k < wrenches_.work.rows(); ++k) work.wrench = work.wrench + wrenches_.work(k);
+      const auto drag = into(work.drag, account.drag);
+      for (Index k = 0; k < drags_.loss.rows(); ++k) drag(drags_.entries[static_cast<std::size_t>(k)].slot, drags_.loss(k));
+      for (Index k = 0; k < wrenches_.work.rows(); ++k) work.wrench += wrenches_.work(k);
       work.ground = -ground_work(plan_.ground, known, points_);
     }
-    return work;
+    return account;
   }
   /// Its kernels by their names in the schedule (sweeps.hpp), to be measured one by one in a step that has been evaluated: visit(name,
   /// call). What the calls write is of no use.
@@ -375,7 +383,7 @@ class EffectSweeps {
     on(plan_.bodies, "world_placement_down", [=, this, &work] { world_placement_down(tree_, work.placement, bodies_.pose); });
     on(points, "find_ground", [=, this] { find_ground(plan_.ground, bodies_.pose, points_); });
   }
-  /// Taken from work().ground once the potential at the end is known.
+  /// Taken from the work of the ground once the potential at the end is known.
   S ground_stored() const { return ground_potential_ - ground_before_; }
 
  private:

@@ -2,6 +2,8 @@
 // The account of a scene's effects.
 #pragma once
 
+#include "layout/field.hpp"
+
 namespace linden {
 
 /// What effects gave (driving ones) or took (losses) [J].
@@ -15,19 +17,48 @@ namespace linden {
   FIELD(drag, "taken")                \
   FIELD(ground, "taken")
 
-template <class S>
 struct EffectWork {
-#define LINDEN_MEMBER(name, sense) S name = S(0.0);
+#define LINDEN_MEMBER(name, sense) double name = 0;
   LINDEN_EFFECT_WORK(LINDEN_MEMBER)
 #undef LINDEN_MEMBER
 
   void add(const EffectWork& more) {
-#define LINDEN_ADD(name, sense) name = name + more.name;
+#define LINDEN_ADD(name, sense) name += more.name;
     LINDEN_EFFECT_WORK(LINDEN_ADD)
 #undef LINDEN_ADD
   }
-  S given() const { return servo + torque + wrench; }
-  S taken() const { return damping + friction + limits + drag + ground; }
+  double given() const { return servo + torque + wrench; }
+  double taken() const { return damping + friction + limits + drag + ground; }
+};
+
+/// Where an effect took least in a step: below zero it gave there.
+struct LeastLoss {
+  double loss = 0;  // [J]
+  Index at = -1;    // velocity row of a joint, slot of a body; -1: nowhere
+
+  void see(Index where, double more) {
+    if (more >= loss) return;
+    loss = more;
+    at = where;
+  }
+};
+
+/// Of one step, with where each of those effects gave that can only take.
+struct EffectAccount {
+  EffectWork work;
+  LeastLoss damping, friction, limits, drag, ground;
+  double kinetic = 0;  // of the mean motion [J]
+
+  void add(const EffectAccount& part) {
+    work.add(part.work);
+    const auto least = [](LeastLoss& mine, const LeastLoss& other) { mine.see(other.at, other.loss); };
+    least(damping, part.damping);
+    least(friction, part.friction);
+    least(limits, part.limits);
+    least(drag, part.drag);
+    least(ground, part.ground);
+    kinetic = part.kinetic;
+  }
 };
 
 }  // namespace linden

@@ -48,7 +48,7 @@ class Stepper {
   /// to complete. A step that fails leaves the state complete, as it was at its beginning.
   virtual StepReport step(State<double>& state, int& history, double time, double h, bool another) = 0;
   /// Of effects, in the step taken last.
-  virtual const EffectWork<double>& effect_work() const = 0;
+  virtual const EffectAccount& effect_account() const = 0;
 
   /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; empty without servos.
   virtual std::span<double> servo_targets() = 0;

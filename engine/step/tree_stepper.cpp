@@ -57,7 +57,7 @@ template <bool kEffects>
 StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h, bool another) {
   StepReport report;
   time_ = time;
-  effect_work_ = {};
+  account_ = {};
   bool bounces = false;
   if constexpr (kEffects) bounces = effects_.plan().bounces;
   if (bounces) last_good_ = state;  // parts of the step may be taken before one fails
@@ -87,7 +87,7 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
 template <bool kEffects>
 void TreeStepper<kEffects>::restore(State<double>& state) {
   state = last_good_;
-  effect_work_ = {};
+  account_ = {};
   sweeps_.refresh(state.q);
 }
 
@@ -169,7 +169,7 @@ bool TreeStepper<kEffects>::strike(State<double>& state, double h, bool arrived)
 {
   if (effects_.plan().effects.limits.empty() || !blows_.met(state)) return false;
   bool struck = false;
-  effect_work_.limits += blows_.strike(state, arrived, struck);
+  account_.work.limits += blows_.strike(state, arrived, struck);
   if (!struck) return false;
   for (Index row = 0; row < before_.rows(); ++row) state.history(row, 0) = h * blows_.velocity()(row);
   state.last_step(0) = h;
@@ -399,6 +399,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
     if (status == StepStatus::converged) {
       held_.end(relative, at_floor, !held || report.factorisations > factors_before);
       least_w_ = now.least_w;
+      mean_kinetic_ = now.energy / (h * h);
       report.residual = std::max(report.residual, relative);
     } else {
       held_.drop();
@@ -494,9 +495,9 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
 /// The new state, from a displacement that solves the step.
 template <bool kEffects>
 void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, bool another) {
-  EffectWork<double> work;
+  EffectAccount part;
   if constexpr (kEffects) {
-    work = effects_.work(sweeps_.left(), work_.delta, before_, state.last_step(0) == h);
+    part = effects_.account(sweeps_.left(), work_.delta, before_, state.last_step(0) == h);
     if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
@@ -508,8 +509,9 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   }
   sweeps_.arrive(h, state);
   if constexpr (kEffects) {
-    work.ground -= effects_.ground_stored();
-    effect_work_.add(work);
+    part.work.ground -= effects_.ground_stored();
+    part.kinetic = mean_kinetic_;
+    account_.add(part);
     time_ += h;
     for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.increment(row);
   }

@@ -37,7 +37,7 @@ class TreeStepper final : public Stepper {
   void use(const BodyConstants<double>& constants) override { sweeps_.use(constants); }
   void forget() override;
   StepReport step(State<double>& state, int& history, double time, double h, bool another) override;
-  const EffectWork<double>& effect_work() const override { return effect_work_; }
+  const EffectAccount& effect_account() const override { return account_; }
   std::span<double> servo_targets() override;
   std::span<double> friction_forces() override;
   EffectMemory effect_memory() override;
@@ -85,7 +85,8 @@ class TreeStepper final : public Stepper {
   double least_w_ = 1;          // of the root found last: see displacement_down
   double to_end_ = 0;           // h of a step that is solved and left for the next one to end; else 0
   double failed_residual_ = 0;  // of the last solve that failed
-  EffectWork<double> effect_work_;  // of the whole step
+  double mean_kinetic_ = 0;  // of the mean motion of the root found last [J]
+  EffectAccount account_;    // of the whole step
   Field<double> before_;             // see know_before
   Field<double> before_innovation_;  // of approach_softly
   HeldFactor held_;

@@ -27,16 +27,14 @@ void damping_map(std::span<const JointDamping> dampers, std::span<const double> 
   }
 }
 
-/// What the dampers took in a step [J].
-template <class S>
-S damping_loss(std::span<const JointDamping> dampers, std::span<const double> share, const S& h, const Field<S>& delta,
-               const Field<S>& before) {
-  S sum(0.0);
+/// What the dampers took in a step: each(row, loss [J]).
+template <class S, class Each>
+void damping_loss(std::span<const JointDamping> dampers, std::span<const double> share, const S& h, const Field<S>& delta,
+                  const Field<S>& before, const Each& each) {
   for (std::size_t k = 0; k < dampers.size(); ++k) {
     const Index row = dampers[k].row;
-    sum = sum + as<S>(dampers[k].coefficient) * delta(row) * worked(share[k], delta(row), before(row));
+    each(row, as<S>(dampers[k].coefficient) * delta(row) * worked(share[k], delta(row), before(row)) / h);
   }
-  return sum / h;
 }
 
 }  // namespace linden

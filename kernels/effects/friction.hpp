@@ -131,17 +131,16 @@ auto revise_friction(Frictions<S>& frictions, const S& h, const Field<S>& residu
   return changed;
 }
 
-/// What friction took in a step [J].
-template <class S>
-S friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& residual, const Field<S>& delta, const Field<S>& before) {
-  S sum(0.0);
+/// What friction took in a step: each(row, loss [J]).
+template <class S, class Each>
+void friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& residual, const Field<S>& delta, const Field<S>& before,
+                   const Each& each) {
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
     const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
     const S held = -residual(friction.row) / (h * h), sliding = frictions.force(k) * frictions.mode(k);
     const S force = select(frictions.mode(k) == S(0.0), held, sliding);
-    sum = sum + force * worked(1, delta(friction.row), before(friction.row));
+    each(friction.row, force * worked(1, delta(friction.row), before(friction.row)));
   }
-  return sum;
 }
 
 }  // namespace linden

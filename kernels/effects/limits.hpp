@@ -109,15 +109,13 @@ auto stopped_bounces(const Limits<S>& limits, const Field<S>& before, const Mask
   return stopped;
 }
 
-/// What the limits took in a step [J].
-template <class S>
-S limit_loss(const Limits<S>& limits, const S& h, const Field<S>& residual, const Field<S>& delta, const Field<S>& before) {
-  S sum(0.0);
+/// What the limits took in a step, but for blows: each(row, loss [J]).
+template <class S, class Each>
+void limit_loss(const Limits<S>& limits, const S& h, const Field<S>& residual, const Field<S>& delta, const Field<S>& before, const Each& each) {
   for (Index k = 0; k < limits.mode.rows(); ++k) {
     const Index row = limits.entries[static_cast<std::size_t>(k)].row;
-    sum = sum - select(limits.mode(k) != S(0.0), residual(row) * worked(1, delta(row), before(row)), S(0.0));
+    each(row, select(limits.mode(k) != S(0.0), -residual(row) * worked(1, delta(row), before(row)) / (h * h), S(0.0)));
   }
-  return sum / (h * h);
 }
 
 }  // namespace linden
