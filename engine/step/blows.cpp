@@ -26,7 +26,7 @@ bool Blows::met(const State<double>& state) const {
     const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
     const double q = state.q(q_row(limit.row));
     const bool at_limit = limit.upper - q <= kAtLimit || q - limit.lower <= kAtLimit;
-    if (at_limit && (limit.restitution > 0 || sweeps_.work().delta(limit.row) != 0)) return true;
+    if (at_limit && (limit.restitution > 0 || std::abs(sweeps_.work().delta(limit.row)) > kAtLimit)) return true;
   }
   return false;
 }
@@ -37,7 +37,7 @@ double Blows::strike(State<double>& state, bool arrived, bool& struck) {
   const Field<Index>& q_row = effects.plan().q_row;
   if (arrived) {
     for (const JointLimit& limit : limits.entries) {
-      if (sweeps_.work().delta(limit.row) != 0) effects.release(limit.row);
+      if (std::abs(sweeps_.work().delta(limit.row)) > kAtLimit) effects.release(limit.row);
     }
   }
   sweeps_.read_velocity(state.p, velocity_);

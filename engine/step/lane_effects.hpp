@@ -55,10 +55,10 @@ class LaneEffects {
   /// After the first guess. Lanes are each at their own time.
   void begin(const Block<Real>& block, double h, const Field<Pack>& q, Workspace<Pack>& work) {
     if (sweeps_.plan().joints) std::ranges::copy(work.momentum_target.flat(), sweeps_.plain_target().flat().begin());
-    std::array<Real, W> time{};
+    LaneTimes<Pack> time{};
     Lanes known = 0;
     for (int l = 0; l < block.count; ++l) {
-      time[static_cast<std::size_t>(l)] = static_cast<Real>((static_cast<double>(block.instances[l].steps) + 0.5) * h);
+      time[static_cast<std::size_t>(l)] = static_cast<double>(block.instances[l].steps) * h;
       known |= block.instances[l].displacements > 0 ? 1u << l : 0u;
     }
     constexpr int words = kHistoryWords<Real> * W;
@@ -68,12 +68,12 @@ class LaneEffects {
       before_(row) = L::load(each.data());
     }
     known_ = known;
-    sweeps_.begin(L::load(time.data()), Pack(static_cast<Real>(h)), q, before_, L::mask(known), false, work.delta);
+    sweeps_.begin(time, h, q, before_, L::mask(known), false, work.delta);
   }
   /// Lanes whose solution has a blow in it, which must be found in time.
-  Lanes blows() const {
+  Lanes blows(const Field<Pack>& q, const Field<Pack>& delta) const {
     if (!sweeps_.plan().bounces) return 0;
-    return L::bits(stopped_bounces(sweeps_.limits(), before_, L::mask(known_)));
+    return L::bits(stopped_bounces(sweeps_.limits(), sweeps_.plan().q_row, q, delta, before_, L::mask(known_)));
   }
 
   /// What effects do to an evaluation, its exact factor, and its norm.

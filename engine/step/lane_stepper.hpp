@@ -338,7 +338,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
       }
       ok &= active & ~changed;
       Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));
-      if (const Lanes blows = ok & effects_.blows(); blows != 0) {
+      if (const Lanes blows = ok & effects_.blows(q_, work_.delta); blows != 0) {
         given_up |= blows;
         ok &= ~blows;
       }

@@ -100,7 +100,7 @@ class Bench {
       auto& effects = sweeps_.effects();
       if (effects.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects.plain_target().flat().begin());
       for (Index row = 0; row < rate_.rows(); ++row) rate_(row) = state_.history(row, 0);
-      effects.begin(0.0, options_.step, state_.q, rate_, history_ > 0, false, work_.delta);
+      effects.begin({0.0}, options_.step, state_.q, rate_, history_ > 0, false, work_.delta);
       sweeps_.begin(0);
     }
     sweeps_.evaluate(true, report);

@@ -215,7 +215,7 @@ void TreeStepper<kEffects>::begin_effects(const State<double>& state, double h)
     sweeps_.velocity_of(state.p, before_);
     for (double& value : before_.flat()) value *= h;
   }
-  effects_.begin(time_ + 0.5 * h, h, state.q, before_, state.last_step(0) != 0, passable_, work_.delta);
+  effects_.begin({time_}, h, state.q, before_, state.last_step(0) != 0, passable_, work_.delta);
   sweeps_.begin(fall(h));
 }
 

@@ -5,6 +5,7 @@
 //   closed  (mode = 1, -1)  delta = highest or lowest exactly, as long as the limit has to push
 //
 //   highest = max(upper - q^k, 0),  lowest = min(lower - q^k, 0)
+//   -h v <= lowest, highest <= h v    with a limit v of velocity
 //
 // No penalty: a closed joint is taken out of the solve, as one that friction holds. A joint never passes its limit by more than the
 // solver's rounding; one that starts beyond it may come back but go no further. Without restitution the step that meets the limit ends
@@ -41,11 +42,21 @@ inline constexpr double kAtLimit = 1e-9;
 /// What bounces does so from this approach speed on; slower it comes to rest [rad/s, m/s].
 inline constexpr double kLeastBounce = 1e-4;
 
+/// What is left of that room at no more than the limit of velocity, either way.
+template <class S>
+LINDEN_INLINE void narrow_by_velocity(const JointLimit& limit, const S& h, S& lowest, S& highest) {
+  using std::max;
+  using std::min;
+  const S reach = h * as<S>(limit.velocity);
+  highest = max(min(highest, reach), -reach);
+  lowest = min(max(lowest, -reach), reach);
+}
+
 /// Room for the displacement, and the modes that its first guess suggests, moved into the limits. before: displacement of the last step,
 /// where that is `known`. passable: see above.
 template <class S, class Mask>
-void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const Field<S>& q, const Field<S>& before, const Mask& known, bool passable,
-                  Field<S>& delta) {
+void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const S& h, const Field<S>& q, const Field<S>& before, const Mask& known,
+                  bool passable, Field<S>& delta) {
   using std::max;
   using std::min;
   const S zero(0.0), one(1.0), slack = as<S>(kAtLimit);
@@ -54,8 +65,9 @@ void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const Field<S>& 
     const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
     const S up = as<S>(limit.upper) - q(q_row(limit.row)), down = as<S>(limit.lower) - q(q_row(limit.row));
     const bool through = passable && limit.restitution > 0;
-    const S highest = through ? select(up > slack, anywhere, max(up, zero)) : max(up, zero);
-    const S lowest = through ? select(down < -slack, -anywhere, min(down, zero)) : min(down, zero);
+    S highest = through ? select(up > slack, anywhere, max(up, zero)) : max(up, zero);
+    S lowest = through ? select(down < -slack, -anywhere, min(down, zero)) : min(down, zero);
+    narrow_by_velocity(limit, h, lowest, highest);
     limits.highest(k) = highest;
     limits.lowest(k) = lowest;
     S& d = delta(limit.row);
@@ -96,15 +108,19 @@ auto revise_limits(Limits<S>& limits, const Field<S>& residual, const Mask& sett
 
 /// In which instances a joint that bounces was stopped by its limit instead: by a solution in which it did not rest there before.
 template <class S, class Mask>
-auto stopped_bounces(const Limits<S>& limits, const Field<S>& before, const Mask& known) {
+auto stopped_bounces(const Limits<S>& limits, const Field<Index>& q_row, const Field<S>& q, const Field<S>& delta, const Field<S>& before,
+                     const Mask& known) {
+  using std::abs;
   const S zero(0.0), slack = as<S>(kAtLimit);
   auto stopped = zero > S(1.0);
   for (Index k = 0; k < limits.mode.rows(); ++k) {
     const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
     if (limit.restitution == 0) continue;
-    const S room = select(limits.mode(k) > zero, limits.highest(k), -limits.lowest(k));
-    const auto rests = known && before(limit.row) == zero && room <= slack;
-    stopped = stopped || (limits.mode(k) != zero && !rests);
+    const S& d = delta(limit.row);
+    const S to = q(q_row(limit.row)) + d;
+    const auto at_limit = as<S>(limit.upper) - to <= slack || to - as<S>(limit.lower) <= slack;  // not only at its limit of velocity
+    const auto rests = known && abs(before(limit.row)) <= slack && abs(d) <= slack;
+    stopped = stopped || (limits.mode(k) != zero && at_limit && !rests);
   }
   return stopped;
 }
