@@ -164,6 +164,7 @@ bool TreeStepper<kEffects>::revise_effects(bool settled, bool one_by_one)
   requires kEffects
 {
   if (!effects_.revise(sweeps_.left(), settled, one_by_one, work_.delta)) return false;
+  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // of a coordinate that comes to hold its leader's row was set
   displacement_map(model_.tree, work_.motion, work_.delta);
   return true;
 }
@@ -273,8 +274,8 @@ Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int hist
   }
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(options_.guess, model_, state, history, h, sweeps_);
-  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
   if constexpr (kEffects) begin_effects(state, history, h);
+  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
   return sweeps_.evaluate(fresh, report);
 }
 

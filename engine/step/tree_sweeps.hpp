@@ -141,7 +141,11 @@ class TreeSweeps {
   void pass_up(Evaluated& now, bool fresh);
   void factor();
   void factor_mass();
+  template <class Added, class Action>
+  void with_ties(const Added& added, const Action& action);
   void tie_rates(const Gains<double>& gains);
+  template <class Down>
+  void tie(const Gains<double>& gains, const Down& down);
   double pass_residual();
   void pass_down();
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
