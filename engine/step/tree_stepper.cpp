@@ -307,7 +307,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
       held_.drop();
       failed_residual_ = relative;
     }
-    if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_);
+    if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_, sweeps_.yields());
     return status;
   };
   const auto try_out = [&](const Evaluated& tried) {

@@ -456,8 +456,7 @@ template <bool kEffects>
 bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) {
   if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
   complete();
-  const Field<double>& inverse = ties_.empty() ? work_.joint_inverse : ties_.yields(work_.joint_inverse);
-  const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, inverse);
+  const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields());
   const double unit = epsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;
 }

@@ -105,6 +105,8 @@ class TreeSweeps {
   Field<double>& left() { return one_pass_ ? work_.innovation : work_.residual; }
   const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
   bool one_pass() const { return one_pass_; }
+  /// d^-1 of each joint, of one that is tied that of its coordinate: how far an impulse moves it.
+  const Field<double>& yields() { return ties_.empty() ? work_.joint_inverse : ties_.yields(work_.joint_inverse); }
   /// u.(d^-1 u_before), summed over the joints, for the innovation of another evaluation with the same factor.
   double slope_along(const Field<double>& innovation_before) const;
   /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
