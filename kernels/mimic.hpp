@@ -4,7 +4,7 @@
 // Z_c is the motion of coordinate c: 1 on its leader's row, a on its followers'. The tree is factored with all tied rows held. Then
 //
 //   X_c       what all joints do while coordinate c moves by one and the others are held: one tree solve each, once a factor
-//   T         Z^T A X + the stiffness that effects give the leaders' rows, k x k: what each coordinate feels
+//   T         Z^T A X, k x k: what each coordinate feels, with the stiffness that effects give its joints
 //   Delta     Delta_0 + X y,  T y = Z^T (r - A Delta_0),  Delta_0 the solve with tied rows held
 //
 // exact for the symmetric and the unsymmetric factor alike. No joint that is tied is asked to resist alone: where Z^T A Z is positive
@@ -15,7 +15,7 @@
 // to the bit: a right side of kHold moves the row by one, and a row moves by 1 / kHold times the impulse that it is left with.
 //
 // cost    k tree solves a factor, k n additions a solve
-// source  Featherstone, Rigid Body Dynamics Algorithms, 8.2 (constraints on generalized coordinates), 9.6 (hybrid dynamics: joints of
+// source  Featherstone, Rigid Body Dynamics Algorithms, 8.2 (constraints on generalized coordinates), ch. 9 (hybrid dynamics: joints of
 //         given motion)
 #pragma once
 
@@ -99,8 +99,12 @@ class MimicTies {
     } else {
       std::ranges::fill(stiffness_.flat(), S(0.0));
     }
-    for (std::size_t c = 0; c < given_.size(); ++c) given_[c] = stiffness_(leader_rows_[c]);
-    for (const Member& member : members_) stiffness_(member.row) = as<S>(kHold<S>);
+    std::ranges::fill(given_, S(0.0));
+    for (const Member& member : members_) {
+      S& given = given_[member.coordinate];
+      if (member.multiplier != 0) given = given + as<S>(member.multiplier * member.multiplier) * stiffness_(member.row);
+      stiffness_(member.row) = as<S>(kHold<S>);
+    }
     if constexpr (Added::to_bodies) {
       return {stiffness_, added.pull};
     } else {
