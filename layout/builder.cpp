@@ -74,9 +74,9 @@ class Build {
     lay_out();
     collect_shapes();
     check_coordinate_names();
+    resolve_mimics();
     check_moved_inertia();
     check_independence();
-    resolve_mimics();
     return std::move(model_);
   }
 
@@ -308,9 +308,15 @@ class Build {
     }
   }
 
-  /// Every joint must feel some inertia: that of its subtree, all joints below held at zero.
+  /// Every joint must feel some inertia: that of its subtree, all joints below held at zero. Of a coordinate that moves several joints
+  /// one of them must.
   void check_moved_inertia() const {
     std::vector<OriginInertia> composite(body_in_slot_.size());
+    std::vector<bool> moves(body_in_slot_.size(), false);
+    std::vector<Index> leader(body_in_slot_.size(), 0);
+    for (const Mimic& mimic : model_.mimics) {
+      leader[static_cast<std::size_t>(mimic.follower_slot)] = leader[static_cast<std::size_t>(mimic.leader_slot)] = mimic.leader_slot;
+    }
     for (Index i = model_.tree.bodies(); i > 0; --i) {
       const Body& body = in_slot(i);
       OriginInertia& whole = composite[static_cast<std::size_t>(i)];
@@ -334,7 +340,8 @@ class Build {
         felt = Eigen::SelfAdjointEigenSolver<Matrix3d>(about, Eigen::EigenvaluesOnly).eigenvalues()[0];
         if (body.kind == JointKind::free && whole.mass == 0) felt = 0;
       }
-      if (!(felt > kMovesNothing * possible)) {
+      moves[static_cast<std::size_t>(i)] = felt > kMovesNothing * possible;
+      if (!moves[static_cast<std::size_t>(i)] && leader[static_cast<std::size_t>(i)] == 0) {
         fail(fmt::format("joint {} moves nothing that resists: link {} and all below it have a mass of {:.3g} kg and an "
                          "inertia of {:.3g} kg m^2 in the direction the joint frees; give the link an inertia, or fix the joint",
                          quoted(body.joint), quoted(body.link), whole.mass, std::max(felt, 0.0)));
@@ -343,12 +350,35 @@ class Build {
         composite[static_cast<std::size_t>(slot_of(body.parent))] += whole.seen_from(body.placement);
       }
     }
+    check_moved_coordinates(moves);
+  }
+
+  /// `moves`, by slot: whether the joint by itself moves something that resists.
+  void check_moved_coordinates(const std::vector<bool>& moves) const {
+    std::unordered_set<Index> moving;
+    for (const Mimic& mimic : model_.mimics) {
+      const bool follower = mimic.multiplier != 0 && moves[static_cast<std::size_t>(mimic.follower_slot)];
+      if (follower || moves[static_cast<std::size_t>(mimic.leader_slot)]) moving.insert(mimic.leader_slot);
+    }
+    for (const Mimic& mimic : model_.mimics) {
+      if (moving.contains(mimic.leader_slot)) continue;
+      fail(fmt::format("joint {} moves nothing that resists, nor does {} or any other joint that follows it; expected one that moves a "
+                       "link with an inertia in the direction the joint frees; give link {} an inertia, or fix the joints",
+                       quoted(in_slot(mimic.leader_slot).joint), quoted(in_slot(mimic.follower_slot).joint),
+                       quoted(in_slot(mimic.leader_slot).link)));
+    }
   }
 
   void check_independence() const {
     const Index slot = dependent_joint(model_);
     if (slot == 0) return;
     const Body& body = in_slot(slot);
+    const bool leads = std::ranges::any_of(model_.mimics, [&](const Mimic& mimic) { return mimic.leader_slot == slot; });
+    if (leads) {
+      fail(fmt::format("joint {} and those that follow it move nothing that resists, or nothing that other joints do not move in the "
+                       "same way; expected joints that each move something of their own; give link {} an inertia, or fix one of them",
+                       quoted(body.joint), quoted(body.link)));
+    }
     fail(fmt::format("joint {} moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
                      "joints that each move something of their own; give link {} an inertia, or fix one of the joints",
                      quoted(body.joint), quoted(body.link)));

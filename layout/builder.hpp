@@ -5,7 +5,7 @@
 //   fixed joint                                     merged: exact inertia, both names still found
 //   planar joint                                    two sliding screws and a turning one, massless bodies between
 //   any axis                                        body frame turned so that the axis is z
-//   mimic                                           linear map of one coordinate
+//   mimic                                           linear map of one coordinate, which has to move a mass, not each of its joints
 //   several roots                                   several trees in one system
 //   collision shapes                                placed in the body's frame; those of links fixed to the world left out
 //
@@ -76,7 +76,8 @@ class TreeBuilder {
   TreeBuilder& warn(std::string message);
 
   /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a shape of negative size, a
-  /// joint that moves no mass or none that others do not move in the same way, a mimic of a joint that does not exist or is no screw.
+  /// coordinate that moves no mass or none that others do not move in the same way, a mimic of a joint that does not exist or is no
+  /// screw.
   Model build() const;
 
  private:

@@ -46,7 +46,7 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
       options_(options),
       gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
       plan_(*model_, options, effects),
-      ties_(model_->mimics, model_->tree.shape.velocities) {
+      ties_(model_->mimics, model_->tree) {
   check(options);
   if (const std::string refused = sudden(effects); !refused.empty()) {
     throw InputError(fmt::format("{} has no forces that change suddenly; the scene has {}", name(scheme), refused));
@@ -148,17 +148,19 @@ void Baseline::accelerate(double time, const Field<double>& v, Field<double>& a)
   fold_mimics(ties_.mimics(), work_.residual);
 
   const Gains<double> gains{work_.gain_up, work_.gain_down, work_.joint_inverse};
+  const auto factor = [&](const auto& added) { articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains, added); };
+  const auto tied = [&](const auto& added) { ties_.empty() ? factor(added) : factor(ties_.held(added)); };
   if (plan_.rotor.rows() > 0) {
-    articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains,
-                           EffectsAdded<double, true, false>{plan_.rotor, none_});
+    tied(EffectsAdded<double, true, false>{plan_.rotor, none_});
   } else {
-    articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains);
+    tied(NothingAdded{});
   }
   const auto solve = [&](const Field<double>& r, Field<double>& x) {
     impulse_pass_up(tree, constants, work_.placement, gains, r, work_.bias, work_.innovation);
     rate_down(tree, constants, work_.placement, gains, work_.innovation, work_.variation, x);
   };
-  if (!ties_.empty()) ties_.factor(solve, work_.increment);
+  const auto load = [&](Index i) { return tied_load(tree, constants, gains, work_.bias, work_.variation, i); };
+  if (!ties_.empty()) ties_.factor(solve, load, work_.increment);
   solve(work_.residual, a);
   if (!ties_.empty()) ties_.complete(a);
 }

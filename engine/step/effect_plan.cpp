@@ -5,6 +5,8 @@
 #include <map>
 
 #include "kernels/articulated_inertia_up.hpp"
+#include "kernels/increment_down.hpp"
+#include "kernels/mimic.hpp"
 #include "kernels/placement_map.hpp"
 #include "layout/workspace.hpp"
 
@@ -16,7 +18,8 @@ constexpr double kUsualGravity = 9.81;
 /// Share of the weight of all bodies that a contact point is taken to bear at least, where its friction is made to stick.
 constexpr double kLeastLoad = 1e-2;
 
-/// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included.
+/// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included. A leader feels that of
+/// its coordinate.
 std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>& rotors) {
   const Tree& tree = model.tree;
   Workspace<double> work;
@@ -25,13 +28,25 @@ std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>
   q.allocate(tree.shape.positions);
   std::ranges::copy(model.neutral(), q.flat().begin());
   placement_map(tree, model.constants, q, work.placement);
-  articulated_inertia_up(tree, model.constants, work.placement, work.articulated,
-                         Gains<double>{work.gain_up, work.gain_down, work.joint_inverse});
+  const Gains<double> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  MimicTies<double> ties(model.mimics, tree);
+  if (ties.empty()) {
+    articulated_inertia_up(tree, model.constants, work.placement, work.articulated, gains);
+  } else {
+    articulated_inertia_up(tree, model.constants, work.placement, work.articulated, gains, ties.held(NothingAdded{}));
+    ties.factor(
+        [&](const Field<double>& r, Field<double>& x) {
+          impulse_pass_up(tree, model.constants, work.placement, gains, r, work.bias, work.innovation);
+          rate_down(tree, model.constants, work.placement, gains, work.innovation, work.variation, x);
+        },
+        [&](Index i) { return tied_load(tree, model.constants, gains, work.bias, work.variation, i); }, work.increment);
+  }
+  const Field<double>& inverse = ties.empty() ? work.joint_inverse : ties.yields(work.joint_inverse);
   std::vector<double> felt(static_cast<std::size_t>(tree.shape.velocities));
   for (Index i = 1; i < tree.shape.slots; ++i) {
     const Index n = velocity_count(tree.kind(i));
     for (Index k = 0; k < n; ++k) {
-      felt[static_cast<std::size_t>(tree.first_v(i) + k)] = 1 / work.joint_inverse(tree.first_block(i) + k * n + k);
+      felt[static_cast<std::size_t>(tree.first_v(i) + k)] = 1 / inverse(tree.first_block(i) + k * n + k);
     }
   }
   for (const Armature& rotor : rotors) felt[static_cast<std::size_t>(rotor.row)] += rotor.inertia;

@@ -54,7 +54,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   add(ties, {evaluation, "fold_mimics", "residual", "residual"});
   add(newton, {factor, "newton_factor_up", "inertia, screw, placement, motion, displacement", "gains"});
   add(!newton, {factor, "articulated_inertia_up", "inertia, screw, placement", "articulated, gains"});
-  add(ties, {factor, "ties: a tree solve for each mimic", "gains", "ties"});
+  add(ties, {factor, "ties: a tree solve for each leader", "gains", "ties"});
   add(!one_pass, {evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation"});
   add(one_pass, {evaluation, "innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation"});
   add(newton, {correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment"});

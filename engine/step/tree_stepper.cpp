@@ -277,6 +277,7 @@ bool TreeStepper<kEffects>::revise_effects(bool settled, bool one_by_one)
   requires kEffects
 {
   if (!effects_.revise(sweeps_.left(), settled, one_by_one, work_.delta)) return false;
+  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // of a coordinate that comes to hold its leader's row was set
   displacement_map(model_.tree, work_.motion, work_.delta);
   return true;
 }
@@ -371,8 +372,8 @@ Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int hist
   }
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(options_.guess, model_, state, history, h, sweeps_);
-  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
   if constexpr (kEffects) begin_effects(state, h);
+  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
   return sweeps_.evaluate(fresh, report);
 }
 
@@ -405,7 +406,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
       held_.drop();
       failed_residual_ = relative;
     }
-    if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_);
+    if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_, sweeps_.yields());
     return status;
   };
   const auto try_out = [&](const Evaluated& tried) {

@@ -53,7 +53,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       has_gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
       one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
       holds_(one_pass_ && options.order == 2 && options.guess == FirstGuess::extrapolation && !plan.revises),
-      ties_(model.mimics, model.tree.shape.velocities),
+      ties_(model.mimics, model.tree),
       effects_(plan, model),
       tree_(model.tree) {
   work_.allocate(model.tree.shape);
@@ -246,35 +246,50 @@ void TreeSweeps<kEffects>::begin(double scale) {
   effect_scale_ = scale;
 }
 
+/// action(added), with joints held that are tied.
+template <bool kEffects>
+template <class Added, class Action>
+void TreeSweeps<kEffects>::with_ties(const Added& added, const Action& action) {
+  if (ties_.empty()) return action(added);
+  action(ties_.held(added));
+}
+
 template <bool kEffects>
 void TreeSweeps<kEffects>::factor() {
-  if (options_.solver == Solver::riqn) {
-    effects_.with_added([&](const auto& added) {
-      articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
+  effects_.with_added([&](const auto& given) {
+    with_ties(given, [&](const auto& added) {
+      if (options_.solver == Solver::riqn) {
+        articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
+      } else {
+        newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains(),
+                         added);
+      }
     });
-    return tie_rates(gains());
-  }
-  effects_.with_added([&](const auto& added) {
-    newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains(), added);
   });
-  if (ties_.empty()) return;
-  ties_.factor(
-      [&](const Field<double>& r, Field<double>& x) {
-        impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), r, work_.bias, work_.innovation);
-        increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
-      },
-      work_.increment);
+  if (options_.solver == Solver::riqn) return tie_rates(gains());
+  tie(gains(), [&](Field<double>& x) {
+    increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
+  });
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::tie_rates(const Gains<double>& gains) {
+  tie(gains, [&](Field<double>& x) {
+    rate_down(model_.tree, *constants_, work_.placement, gains, work_.innovation, work_.variation, x);
+  });
+}
+
+/// down(x): the second half of a solve.
+template <bool kEffects>
+template <class Down>
+void TreeSweeps<kEffects>::tie(const Gains<double>& gains, const Down& down) {
   if (ties_.empty()) return;
   ties_.factor(
       [&](const Field<double>& r, Field<double>& x) {
         impulse_pass_up(model_.tree, *constants_, work_.placement, gains, r, work_.bias, work_.innovation);
-        rate_down(model_.tree, *constants_, work_.placement, gains, work_.innovation, work_.variation, x);
+        down(x);
       },
-      work_.increment);
+      [&](Index i) { return tied_load(model_.tree, *constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
 }
 
 /// Residual and first half of a solve of some joints; fresh: with a factor made on the way.
@@ -426,7 +441,7 @@ template <bool kEffects>
 bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) {
   if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
   complete();
-  const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
+  const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields());
   const double unit = epsilons * std::numeric_limits<double>::epsilon();
   return norm <= unit * unit * sum;
 }
@@ -468,7 +483,9 @@ template <bool kEffects>
 template <class Added>
 void TreeSweeps<kEffects>::factor_mass(const Added& added) {
   place_all();
-  articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), added);
+  with_ties(added, [&](const auto& all) {
+    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), all);
+  });
   tie_rates(mass_gains());
 }
 

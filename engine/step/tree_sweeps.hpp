@@ -105,6 +105,8 @@ class TreeSweeps {
   Field<double>& left() { return one_pass_ ? work_.innovation : work_.residual; }
   const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
   bool one_pass() const { return one_pass_; }
+  /// d^-1 of each joint, of one that is tied that of its coordinate: how far an impulse moves it.
+  const Field<double>& yields() { return ties_.empty() ? work_.joint_inverse : ties_.yields(work_.joint_inverse); }
   /// u.(d^-1 u_before), summed over the joints, for the innovation of another evaluation with the same factor.
   double slope_along(const Field<double>& innovation_before) const;
   /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
@@ -153,7 +155,11 @@ class TreeSweeps {
   void factor();
   template <class Added>
   void factor_mass(const Added& added);
+  template <class Added, class Action>
+  void with_ties(const Added& added, const Action& action);
   void tie_rates(const Gains<double>& gains);
+  template <class Down>
+  void tie(const Gains<double>& gains, const Down& down);
   double pass_residual();
   void pass_down();
   double momenta_of_delta(Field<double>& momenta);

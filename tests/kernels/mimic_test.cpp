@@ -46,23 +46,51 @@ MatrixXd tie_matrix(const std::vector<Mimic>& ties, Index velocities) {
   return result;
 }
 
+/// x = A^-1 r of a factor of either kind, tied rows held.
 template <class S>
-void solve_newton(Rig<S>& rig, const Field<S>& r, Field<S>& x) {
+void solve(Rig<S>& rig, bool newton, const Field<S>& r, Field<S>& x) {
   pass_up(rig, r);
-  pass_down_newton(rig);
+  newton ? pass_down_newton(rig) : pass_down_mass(rig);
   for (Index row = 0; row < x.rows(); ++row) x(row) = rig.work.increment(row);
 }
 
 template <class S>
-void solve_mass(Rig<S>& rig, const Field<S>& r, Field<S>& x) {
-  pass_up(rig, r);
-  pass_down_mass(rig);
-  for (Index row = 0; row < x.rows(); ++row) x(row) = rig.work.increment(row);
+void factor_ties(Rig<S>& rig, bool newton, MimicTies<S>& ties) {
+  ties.factor([&](const Field<S>& r, Field<S>& x) { solve(rig, newton, r, x); },
+              [&](Index i) { return tied_load(rig.tree, rig.constants, rig.gains(), rig.work.bias, rig.work.variation, i); }, rig.rate);
 }
 
-std::vector<Model> trees_with_screws() {
-  return {random_tree({.bodies = 12, .seed = 31, .frees = false}), random_tree({.bodies = 14, .seed = 32}),
-          random_tree({.bodies = 10, .seed = 33, .balls = false, .frees = false, .floating = true})};
+/// The factor of the exact Jacobian or of the mass matrix, with what effects add to it, and of the ties.
+template <class Added = NothingAdded>
+void factor(Rig<double>& rig, bool newton, MimicTies<double>& ties, const Added& added = {}) {
+  newton ? factor_newton(rig, ties.held(added)) : factor_mass(rig, ties.held(added));
+  factor_ties(rig, newton, ties);
+}
+
+/// What the right side of the rig makes all coordinates do.
+template <class S>
+VectorXd solved(Rig<S>& rig, bool newton, MimicTies<S>& ties) {
+  Field<S> x;
+  x.allocate(rig.tree.shape.velocities);
+  solve(rig, newton, rig.right_side, x);
+  ties.complete(x);
+  return vector(x);
+}
+
+/// The exact Jacobian, or the mass matrix, of all coordinates.
+MatrixXd matrix_of(const Model& model, const Rig<double>& rig, const Instance& instance, bool newton) {
+  if (newton) return reference::dense_jacobian(model, rig.work.placement, rig.work.motion);
+  return reference::mass_matrix(reference::plain_tree(model), instance.q);
+}
+
+/// The matrix that the tied solve has to invert on free coordinates.
+MatrixXd tied_matrix(const Model& model, const Rig<double>& rig, const Instance& instance, const MatrixXd& A, bool newton) {
+  return A.transpose() * matrix_of(model, rig, instance, newton) * A;
+}
+
+std::vector<Model> trees_with_screws(Index more = 0) {
+  return {random_tree({.bodies = 12 + more, .seed = 31, .frees = false}), random_tree({.bodies = 14 + more, .seed = 32}),
+          random_tree({.bodies = 10 + more, .seed = 33, .balls = false, .frees = false, .floating = true})};
 }
 
 TEST_CASE("fold_mimics is the transpose of spread_mimics") {
@@ -94,7 +122,7 @@ TEST_CASE("fold_mimics is the transpose of spread_mimics") {
 }
 
 TEST_CASE("a tied solve is the dense solve with A^T J A, for the exact Jacobian and for the mass matrix") {
-  double worst_newton = 0, worst_mass = 0;
+  double worst[] = {0, 0};
   for (const Model& model : trees_with_screws()) {
     const PlainTree tree = reference::plain_tree(model);
     for (const std::size_t count : {1u, 2u, 3u}) {
@@ -102,38 +130,117 @@ TEST_CASE("a tied solve is the dense solve with A^T J A, for the exact Jacobian 
         const std::vector<Mimic> ties = random_ties(model.tree, 10 + count, count);
         const MatrixXd A = tie_matrix(ties, tree.velocities);
         const Instance instance = random_instance(tree, 4, turn);
-        const auto dense = [&](const MatrixXd& J) {
-          const MatrixXd tied = A.transpose() * J * A;
-          return VectorXd(A * dense_solve(tied, A.transpose() * instance.right_side));
-        };
         Rig<double> rig(model);
         rig.set(instance);
-        fold_mimics<double>(ties, rig.right_side);
-        MimicTies<double> mimics(ties, tree.velocities);
+        MimicTies<double> mimics(ties, model.tree);
         CHECK(!mimics.empty());
         CHECK(mimics.mimics().size() == count);
-        Field<double> x;
-        x.allocate(tree.velocities);
-
-        factor_newton(rig);
-        mimics.factor([&](const Field<double>& r, Field<double>& out) { solve_newton(rig, r, out); }, rig.rate);
-        solve_newton(rig, rig.right_side, x);
-        mimics.complete(x);
-        const VectorXd newton = dense(reference::dense_jacobian(model, rig.work.placement, rig.work.motion));
-        see(worst_newton, relative_error(vector(x), newton));
-        for (const Mimic& tie : ties) CHECK(x(tie.follower_v) == tie.multiplier * x(tie.leader_v));
-
-        factor_mass(rig);
-        mimics.factor([&](const Field<double>& r, Field<double>& out) { solve_mass(rig, r, out); }, rig.rate);
-        solve_mass(rig, rig.right_side, x);
-        mimics.complete(x);
-        see(worst_mass, relative_error(vector(x), dense(reference::mass_matrix(tree, instance.q))));
+        for (const bool newton : {false, true}) {
+          factor(rig, newton, mimics);
+          const VectorXd x = solved(rig, newton, mimics);
+          const MatrixXd dense = tied_matrix(model, rig, instance, A, newton);
+          see(worst[newton], relative_error(x, A * dense_solve(dense, A.transpose() * instance.right_side)));
+          for (const Mimic& tie : ties) CHECK(x[tie.follower_v] == tie.multiplier * x[tie.leader_v]);
+        }
       }
     }
   }
-  INFO("worst relative error with the Jacobian: " << worst_newton << ", with M: " << worst_mass);
-  CHECK(worst_newton < 1e-10);
-  CHECK(worst_mass < 1e-10);
+  INFO("worst relative error with M: " << worst[0] << ", with the Jacobian: " << worst[1]);
+  CHECK(worst[0] < 1e-10);
+  CHECK(worst[1] < 1e-10);
+}
+
+/// The bodies of some joints without inertia.
+Model without_inertia(Model model, const std::vector<Index>& slots) {
+  for (const Index slot : slots) std::fill_n(model.constants.inertia.row(slot), 10, 0.0);
+  return model;
+}
+
+TEST_CASE("a joint that moves nothing by itself moves with the coordinate that it is part of") {
+  enum class Massless { follower, leader, all_but_one };
+  double worst[] = {0, 0};
+  for (const Model& tree : trees_with_screws(20)) {
+    std::vector<Index> leaves;
+    for (Index i = 1; i < tree.tree.shape.slots; ++i) {
+      if (tree.tree.kind(i) == JointKind::screw && tree.tree.is_leaf(i) != 0) leaves.push_back(i);
+    }
+    REQUIRE(leaves.size() >= 3);
+    const auto tie = [&](Index follower, Index leader, double multiplier) {
+      const Tree& t = tree.tree;
+      return Mimic{follower, leader, t.first_v(follower), t.first_v(leader), t.first_q(follower), t.first_q(leader), multiplier, 0};
+    };
+    const std::vector<Mimic> ties{tie(leaves[0], leaves[1], -1.5), tie(leaves[2], leaves[1], 0.25)};
+    for (const Massless massless : {Massless::follower, Massless::leader, Massless::all_but_one}) {
+      const std::vector<Index> slots = massless == Massless::follower ? std::vector{leaves[0]}
+                                       : massless == Massless::leader ? std::vector{leaves[1]}
+                                                                      : std::vector{leaves[0], leaves[1]};
+      const Model model = without_inertia(tree, slots);
+      const PlainTree plain = reference::plain_tree(model);
+      const MatrixXd A = tie_matrix(ties, plain.velocities);
+      for (const double turn : {1e-3, 0.5}) {
+        const Instance instance = random_instance(plain, 4, turn);
+        Rig<double> rig(model);
+        rig.set(instance);
+        MimicTies<double> mimics(ties, model.tree);
+        for (const bool newton : {false, true}) {
+          factor(rig, newton, mimics);
+          const VectorXd x = solved(rig, newton, mimics);
+          const MatrixXd dense = tied_matrix(model, rig, instance, A, newton);
+          see(worst[newton], relative_error(x, A * dense_solve(dense, A.transpose() * instance.right_side)));
+        }
+      }
+    }
+  }
+  INFO("worst relative error with M: " << worst[0] << ", with the Jacobian: " << worst[1]);
+  CHECK(worst[0] < 1e-10);
+  CHECK(worst[1] < 1e-10);
+}
+
+TEST_CASE("a coordinate feels the stiffness of all its joints, and what holds one of them holds all") {
+  const Model model = random_tree({.bodies = 12, .seed = 31, .frees = false});
+  const PlainTree tree = reference::plain_tree(model);
+  const std::vector<Mimic> ties = random_ties(model.tree, 5, 3);
+  const MatrixXd A = tie_matrix(ties, tree.velocities);
+  const Instance instance = random_instance(tree, 4, 0.5);
+  Rig<double> rig(model);
+  rig.set(instance);
+  MimicTies<double> mimics(ties, model.tree);
+  Field<double> stiffness;
+  const Field<double, 36> none;
+  const Index leader = ties[0].leader_v;
+  const auto is_of_leader = [&](const Mimic& tie) { return tie.leader_v == leader; };
+  REQUIRE(std::ranges::count_if(ties, is_of_leader) < 3);
+  for (const bool newton : {false, true}) {
+    stiffness.allocate(tree.velocities);
+    Random random(8);
+    for (const Mimic& tie : ties) {
+      stiffness(tie.leader_v) = random.uniform(0.1, 3);
+      stiffness(tie.follower_v) = random.uniform(0.1, 3);
+    }
+    factor(rig, newton, mimics, EffectsAdded<double, true, false>{stiffness, none});
+    MatrixXd matrix = matrix_of(model, rig, instance, newton);
+    matrix.diagonal() += vector(stiffness);
+    const VectorXd x = solved(rig, newton, mimics);
+    CHECK(relative_error(x, A * dense_solve(A.transpose() * matrix * A, A.transpose() * instance.right_side)) < 1e-11);
+
+    stiffness(leader) = std::numeric_limits<double>::infinity();
+    factor(rig, newton, mimics, EffectsAdded<double, true, false>{stiffness, none});
+    matrix(leader, leader) = 0;  // what is held has no column: its row is the impulse that holds it
+    MatrixXd others(A.rows(), 0);
+    for (Index c = 0; c < A.cols(); ++c) {
+      if (A(leader, c) != 0) continue;
+      others.conservativeResize(Eigen::NoChange, others.cols() + 1);
+      others.rightCols<1>() = A.col(c);
+    }
+    REQUIRE(others.cols() == A.cols() - 1);
+    const VectorXd held = solved(rig, newton, mimics);
+    const MatrixXd left = others.transpose() * matrix * others;
+    CHECK(relative_error(held, others * dense_solve(left, others.transpose() * instance.right_side)) < 1e-11);
+    CHECK(held[leader] == 0);
+    for (const Mimic& tie : ties) {
+      if (is_of_leader(tie)) CHECK(held[tie.follower_v] == 0);
+    }
+  }
 }
 
 TEST_CASE("how an impulse is shared between leader and follower does not matter once it is folded") {
@@ -142,19 +249,11 @@ TEST_CASE("how an impulse is shared between leader and follower does not matter 
   const std::vector<Mimic> ties = random_ties(model.tree, 5, 1);
   Rig<double> rig(model);
   rig.set(random_instance(tree, 4, 0.5));
-  factor_newton(rig);
-  MimicTies<double> mimics(ties, tree.velocities);
-  mimics.factor([&](const Field<double>& r, Field<double>& out) { solve_newton(rig, r, out); }, rig.rate);
-  const auto solved = [&] {
-    Field<double> x;
-    x.allocate(tree.velocities);
-    solve_newton(rig, rig.right_side, x);
-    mimics.complete(x);
-    return vector(x);
-  };
-  const VectorXd unfolded = solved();
+  MimicTies<double> mimics(ties, model.tree);
+  factor(rig, true, mimics);
+  const VectorXd unfolded = solved(rig, true, mimics);
   fold_mimics<double>(ties, rig.right_side);
-  CHECK(relative_error(solved(), unfolded) < 1e-11);
+  CHECK(relative_error(solved(rig, true, mimics), unfolded) < 1e-11);
 }
 
 TEST_CASE("two equal wheels geared one to minus two turn as one of five times the inertia") {
@@ -169,19 +268,15 @@ TEST_CASE("two equal wheels geared one to minus two turn as one of five times th
   Rig<double> rig(model);
   fill(rig.state.q, Eigen::Vector2d::Zero());
   fill(rig.work.delta, Eigen::Vector2d::Zero());
-  factor_mass(rig);
-  MimicTies<double> mimics(model.mimics, 2);
-  mimics.factor([&](const Field<double>& r, Field<double>& out) { solve_mass(rig, r, out); }, rig.rate);
+  MimicTies<double> mimics(model.mimics, model.tree);
+  factor(rig, false, mimics);
   fill(rig.right_side, Eigen::Vector2d(4, 0));
-  Field<double> x;
-  x.allocate(2);
-  solve_mass(rig, rig.right_side, x);
-  mimics.complete(x);
+  const VectorXd x = solved(rig, false, mimics);
   const Mimic& tie = model.mimics[0];
   // 4 on the leader: or, where the builder put the leader second, on the follower, -2 times as much on the leader
   const double push = tie.leader_v == 0 ? 4 : -8;
-  CHECK(x(tie.leader_v) == Approx(push / (0.4 * 5)));
-  CHECK(x(tie.follower_v) == Approx(-2 * push / (0.4 * 5)));
+  CHECK(x[tie.leader_v] == Approx(push / (0.4 * 5)));
+  CHECK(x[tie.follower_v] == Approx(-2 * push / (0.4 * 5)));
 }
 
 TEST_CASE("ties allocate nothing once they are made") {
@@ -190,33 +285,34 @@ TEST_CASE("ties allocate nothing once they are made") {
   const std::vector<Mimic> ties = random_ties(model.tree, 5, 3);
   Rig<double> rig(model);
   rig.set(random_instance(tree, 4, 0.5));
-  factor_newton(rig);
-  MimicTies<double> mimics(ties, tree.velocities);
+  find_momenta(rig);
+  MimicTies<double> mimics(ties, model.tree);
   Field<double> x;
   x.allocate(tree.velocities);
   const AllocationCounter counter;
   fold_mimics<double>(ties, rig.right_side);
-  mimics.factor([&](const Field<double>& r, Field<double>& out) { solve_newton(rig, r, out); }, rig.rate);
-  solve_newton(rig, rig.right_side, x);
+  factor(rig, true, mimics);
+  solve(rig, true, rig.right_side, x);
   mimics.complete(x);
+  mimics.yields(rig.work.joint_inverse);
   spread_mimics<double>(ties, x);
   const std::int64_t allocations = counter.count();
   CHECK(allocations == 0);
 }
 
 TEST_CASE("a tied solve gives equal bits in every lane") {
-  const auto kernel =
-      make_kernel([](auto& rig) { factor_newton(rig); },
-                  [](auto& rig) {
-                    using S = std::decay_t<decltype(rig.h)>;
-                    const std::vector<Mimic> ties = random_ties(rig.tree, 6, 2);
-                    MimicTies<S> mimics(ties, rig.tree.shape.velocities);
-                    mimics.factor([&](const Field<S>& r, Field<S>& out) { solve_newton(rig, r, out); }, rig.rate);
-                    fold_mimics<S>(ties, rig.right_side);
-                    solve_newton(rig, rig.right_side, rig.work.residual);
-                    mimics.complete(rig.work.residual);
-                  },
-                  {"residual"});
+  const auto kernel = make_kernel([](auto&) {},
+                                  [](auto& rig) {
+                                    using S = std::decay_t<decltype(rig.h)>;
+                                    const std::vector<Mimic> ties = random_ties(rig.tree, 6, 2);
+                                    MimicTies<S> mimics(ties, rig.tree);
+                                    factor_mass(rig, mimics.held(NothingAdded{}));
+                                    factor_ties(rig, false, mimics);
+                                    fold_mimics<S>(ties, rig.right_side);
+                                    solve(rig, false, rig.right_side, rig.work.residual);
+                                    mimics.complete(rig.work.residual);
+                                  },
+                                  {"residual"});
   check_lanes(kernel, kAfterElimination);
 }
 

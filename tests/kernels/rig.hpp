@@ -137,13 +137,14 @@ void find_residual(Rig<S>& rig) {
 }
 
 /// One tree has a factor of its own (lanes = rows of its matrices), a block of instances another; both leave the same gains.
-template <class S>
-void factor_newton(Rig<S>& rig) {
+template <class S, class Added = NothingAdded>
+void factor_newton(Rig<S>& rig, const Added& added = {}) {
   find_momenta(rig);
   if constexpr (std::is_same_v<S, double>) {
     newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.displacement,
-                     rig.work.articulated, rig.gains());
+                     rig.work.articulated, rig.gains(), added);
   } else {
+    static_assert(std::is_same_v<Added, NothingAdded>);
     Rig<S> block = rig;
     start_down(block.tree, block.constants, block.work);
     newton_up<false>(block.tree, block.constants, block.work);
@@ -154,10 +155,10 @@ void factor_newton(Rig<S>& rig) {
   poison(rig.work.articulated);
 }
 
-template <class S>
-void factor_mass(Rig<S>& rig) {
+template <class S, class Added = NothingAdded>
+void factor_mass(Rig<S>& rig, const Added& added = {}) {
   place(rig);
-  articulated_inertia_up(rig.tree, rig.constants, rig.work.placement, rig.work.articulated, rig.gains());
+  articulated_inertia_up(rig.tree, rig.constants, rig.work.placement, rig.work.articulated, rig.gains(), added);
 }
 
 template <class S>
