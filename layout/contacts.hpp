@@ -1,5 +1,7 @@
 // layout/contacts.hpp
-// Where bodies may touch the ground: the collision shapes of a robot's file, reduced to what a plane can meet first.
+// Where bodies may touch the ground: the collision shapes of a robot's file, reduced to what a plane can meet first. The gap between one of
+// these and the ground is that of the shape (kernels/contact_geometry.hpp): a sphere or rim that rolls is met at its lowest place, whatever
+// material that is.
 //
 //   shape      spheres                      rims
 //   sphere     one
@@ -29,7 +31,7 @@ struct ContactSphere {
   double radius;                 // [m]
 };
 
-/// The edge of a disc: of its points the lowest touches first, and those a quarter turn away hold it upright.
+/// The edge of a disc: its lowest place touches first, and the places a quarter turn away and opposite hold it where it lies flat.
 struct ContactRim {
   Index slot;
   std::array<double, 3> center;  // [m]

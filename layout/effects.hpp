@@ -115,7 +115,9 @@ struct Drag {
   double quadratic = 0;  // [N s^2/m^2]
 };
 
-/// Heights over the ground's plane on a grid, straight between its points; beyond its edges the last row goes on.
+/// Heights over the ground's plane on a grid, two triangles a cell: (0,0) (1,0) (0,1) and (1,1) (0,1) (1,0). Beyond an edge of the map its
+/// last row or column goes on for ever: the height is that of the nearest point of the map, and the ground's normal is that of these heights,
+/// level across the edge; beyond a corner all is level.
 struct HeightField {
   Index columns, rows;           // along x, along y of the plane; 2 or more each
   double spacing_x, spacing_y;   // [m]

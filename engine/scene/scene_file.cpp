@@ -12,6 +12,7 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_effects.hpp"
 #include "engine/scene/scene_yaml.hpp"
+#include "engine/step/effect_plan.hpp"
 #include "layout/merged_models.hpp"
 #include "layout/text_file.hpp"
 #include "layout/words.hpp"
@@ -55,11 +56,22 @@ class SceneReader {
       scene_.effects = std::move(read.effects);
       scene_.options.gravity = read.gravity;
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
+      if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
     return std::move(scene_);
   }
 
  private:
+  void warn_of_stiff_ground(const SceneValue& at) {
+    const std::optional<StiffContact> stiff = stiffest_unresolved(scene_.model, scene_.options, scene_.effects);
+    if (!stiff) return;
+    const double h = scene_.options.step, stiffness = scene_.effects.ground->stiffness;
+    scene_.model.warnings.push_back(fmt::format(
+        "{}: a step of {:g} s does not resolve a stiffness of {:.3g} N/m under the {:.3g} kg of link {}: what bounces there loses energy; elastic "
+        "bounces need a step below {:.3g} s or a stiffness below {:.3g} N/m",
+        at.place(), h, stiffness, stiff->mass, linden::quoted(stiff->link), std::sqrt(stiff->mass / stiffness), stiff->mass / (h * h)));
+  }
+
   void read_model() {
     const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base");
     if (one && several) several->fail("model and models are both given", "one of them", "move the model into the list models");

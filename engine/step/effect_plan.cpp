@@ -5,9 +5,11 @@
 #include <map>
 
 #include "kernels/articulated_inertia_up.hpp"
+#include "kernels/effects/joint_impulses.hpp"
 #include "kernels/increment_down.hpp"
 #include "kernels/mimic.hpp"
 #include "kernels/placement_map.hpp"
+#include "kernels/spatial.hpp"
 #include "layout/workspace.hpp"
 
 namespace linden {
@@ -17,6 +19,15 @@ constexpr double kUsualGravity = 9.81;
 
 /// Share of the weight of all bodies that a contact point is taken to bear at least, where its friction is made to stick.
 constexpr double kLeastLoad = 1e-2;
+
+/// Share of critical damping from which on little of a bounce is left to lose: its rebound is down to half.
+constexpr double kBouncesLittle = 0.2;
+
+/// Mass that a force on a body is taken to move.
+double moved_mass(const Model& model, Index slot) {
+  const double own = model.constants.inertia(slot, 0);
+  return own > 0 ? own : model.constants.subtree_mass(slot);
+}
 
 /// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included. A leader feels that of
 /// its coordinate.
@@ -53,26 +64,52 @@ std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>
   return felt;
 }
 
-Mat3<double> plane_frame(const std::array<double, 3>& normal) {
+std::array<std::array<double, 3>, 3> plane_frame(const std::array<double, 3>& normal) {
   const Vec3<double> z{normal[0], normal[1], normal[2]};
   // the plane's x lies in the world's x-z plane where that is possible
   const Vec3<double> helper = std::abs(z.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0};
   const Vec3<double> across = helper - dot(helper, z) * z;
   const Vec3<double> x = (1 / std::sqrt(dot(across, across))) * across;
-  return {x, cross(z, x), z};
+  const Vec3<double> y = cross(z, x);
+  return {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, normal}};
 }
 
-std::vector<GroundPoint> points_of(const Contacts& contacts) {
+/// Of each candidate those on the first feature that is near, on a terrain also those on further ones.
+std::vector<GroundPoint> points_of(const Ground& ground) {
   std::vector<GroundPoint> points;
-  for (const ContactSphere& sphere : contacts.spheres) points.push_back({sphere.slot, sphere.center, sphere.radius, {}, 0, 0});
-  for (const ContactRim& rim : contacts.rims) {
-    for (int quarter = 0; quarter < 4; ++quarter) points.push_back({rim.slot, rim.center, 0, rim.axis, rim.radius, quarter});
+  const int ranks = ground.terrain ? kTerrainRanks : 1;
+  for (const ContactSphere& sphere : ground.contacts.spheres) {
+    for (int rank = 0; rank < ranks; ++rank) {
+      points.push_back({.slot = sphere.slot, .center = sphere.center, .radius = sphere.radius, .rank = rank});
+    }
+  }
+  for (const ContactRim& rim : ground.contacts.rims) {
+    for (int rank = 0; rank < ranks; ++rank) {
+      for (int quarter = 0; quarter < (rank == 0 ? 4 : 1); ++quarter) {
+        points.push_back({rim.slot, rim.center, 0, rim.axis, rim.radius, quarter, rank});
+      }
+    }
   }
   std::ranges::stable_sort(points, {}, &GroundPoint::slot);
   return points;
 }
 
 }  // namespace
+
+std::optional<StiffContact> stiffest_unresolved(const Model& model, const Options& options, const Effects& effects) {
+  if (!effects.ground) return std::nullopt;
+  const Ground& ground = *effects.ground;
+  Index stiffest = 0;
+  const auto look_at = [&](Index slot) {
+    const double mass = moved_mass(model, slot), damping = 0.5 * ground.damping / std::sqrt(ground.stiffness * mass);
+    const bool resolved = begin_share(options.step * options.step * ground.stiffness / mass) <= 0.5;
+    if (!resolved && damping < kBouncesLittle && (stiffest == 0 || mass < moved_mass(model, stiffest))) stiffest = slot;
+  };
+  for (const ContactSphere& sphere : ground.contacts.spheres) look_at(sphere.slot);
+  for (const ContactRim& rim : ground.contacts.rims) look_at(rim.slot);
+  if (stiffest == 0) return std::nullopt;
+  return StiffContact{model.names.body[static_cast<std::size_t>(stiffest)], moved_mass(model, stiffest)};
+}
 
 EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
   check(effects, model);
@@ -82,7 +119,8 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
   std::ranges::stable_sort(effects.wrenches, {}, &BodyWrench::slot);
   if (effects.ground) {
     ground.ground = *effects.ground;
-    ground.points = points_of(effects.ground->contacts);
+    ground.points = points_of(*effects.ground);
+    if (const auto& terrain = effects.ground->terrain) ground.highest = std::ranges::max(terrain->heights);
   }
   const std::vector<GroundPoint>& points = ground.points;
 
@@ -126,10 +164,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
       servo_share.push_back(begin_share((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row)));
     }
   }
-  const auto mass = [&](Index slot) {
-    const double own = model.constants.inertia(slot, 0);
-    return own > 0 ? own : model.constants.subtree_mass(slot);
-  };
+  const auto mass = [&](Index slot) { return moved_mass(model, slot); };
   for (const Drag& one : effects.drag) {
     // a falling body reaches sqrt(m g / b2) at most
     drag_share.push_back(begin_share(h * (one.linear / mass(one.slot) + std::sqrt(one.quadratic * kUsualGravity / mass(one.slot)))));

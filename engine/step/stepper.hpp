@@ -14,6 +14,7 @@
 #include "engine/step/effect_plan.hpp"
 #include "engine/step/effect_work.hpp"
 #include "engine/step_report.hpp"
+#include "kernels/spatial.hpp"
 #include "layout/state.hpp"
 
 namespace linden {

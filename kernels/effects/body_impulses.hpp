@@ -17,6 +17,7 @@
 
 #include <span>
 
+#include "kernels/contact_geometry.hpp"
 #include "kernels/effects/joint_impulses.hpp"
 #include "kernels/se3.hpp"
 
@@ -32,12 +33,6 @@ template <class Scalar>
 struct BodyImpulses {
   LINDEN_FIELDS(LINDEN_BODY_IMPULSES_FIELDS)
 };
-
-/// How far the point c of a body moves, in the body frame before it.
-template <class S>
-LINDEN_INLINE Vec3<S> point_displacement(const Displacement<S>& D, const Vec3<S>& c) {
-  return D.p + S(2.0) * cross(D.r.v, D.r.w * c + cross(D.r.v, c));
-}
 
 template <class S>
 void clear_body(BodyImpulses<S>& sum, Index i) {

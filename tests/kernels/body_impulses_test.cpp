@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "kernels/effects/drag.hpp"
-#include "kernels/effects/ground.hpp"
 #include "kernels/effects/wrench.hpp"
 
 namespace linden {
@@ -74,33 +73,6 @@ TEST_CASE("the factor's share of drag is the derivative of its force") {
     drags.loss.allocate(1);
     drag_map(drags, 0, 1, constants, kStep, body.displacement, body.sum, body.impulse);
   });
-}
-
-TEST_CASE("the factor's share of the ground is the derivative of its force, sticking, sliding and soft") {
-  for (const double slides : {0.0, 1.0}) {
-    for (const double creep : {0.0, 1e-3, 10.0}) {
-      for (const double depth : {1e-3, -1e-4}) {
-        GroundPlan plan;
-        plan.ground.stiffness = 2e4;
-        plan.ground.damping = 30;
-        plan.ground.friction = 0.6;
-        plan.points = {{.slot = 1, .center = {0.1, -0.2, 0.05}, .radius = 0.03}};
-        plan.share = {0.8};
-        plan.least_load = 1;
-        INFO("slides " << slides << ", creep " << creep << ", depth " << depth);
-        check_derivative([&](TouchedOnce& body) {
-          GroundPoints<double> points;
-          points.allocate({.slots = 1});
-          store(points.center, 0, Vec3<double>{0.1, -0.2, 0.05});
-          store(points.normal, 0, Vec3<double>{0, 0.6, 0.8});
-          points.gap(0) = -depth;
-          points.slides(0) = slides;
-          ground_map(plan, 0, 1, kStep, creep, body.displacement, points, body.sum, body.impulse);
-          REQUIRE(points.closed(0) == 1);
-        });
-      }
-    }
-  }
 }
 
 TEST_CASE("forces of both ends are one wrench in space") {

@@ -1,0 +1,40 @@
+// kernels/effects/ground_plan.hpp
+// The ground as its sweeps read it: where shapes may touch it, and the numbers that do not change. Plain data; the law stands in
+// kernels/effects/ground.hpp.
+//
+// A candidate is a sphere (radius 0: a corner) or a rim. On a plane a sphere is one point, a rim four: the lowest of its circle, the
+// highest, and the two between. On a terrain, where a candidate may rest on several features at once, each has up to kTerrainRanks of
+// them: a sphere one point a rank, a rim its four on the first and its lowest on each further one.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "layout/effects.hpp"
+
+namespace linden {
+
+/// Features of a terrain that one candidate can rest on at once: three hold a ball in a corner.
+inline constexpr int kTerrainRanks = 3;
+
+struct GroundPoint {
+  Index slot;
+  std::array<double, 3> center;
+  double radius;
+  std::array<double, 3> axis{};  // of the rim
+  double rim_radius = 0;         // 0: a sphere
+  int quarter = 0;               // 0 the lowest, 2 the highest, 1 and 3 between
+  int rank = 0;                  // which of the features that are near
+  bool begins_candidate() const { return rank == 0 && quarter == 0; }
+};
+
+struct GroundPlan {
+  Ground ground;
+  std::array<std::array<double, 3>, 3> frame{};  // x, y and normal of the plane, world frame
+  double least_load = 0;                         // N_least [N]
+  double highest = 0;                            // of the terrain over the plane [m]
+  std::vector<GroundPoint> points;               // sorted by slot; those of one candidate together
+  std::vector<double> share;                     // s of the normal force, one number a point
+};
+
+}  // namespace linden
