@@ -1,0 +1,376 @@
+// Checks of one instance: refusals, positions beside the plain simulator, energies, velocities.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/batch.hpp"
+#include "families.hpp"
+#include "models/random.hpp"
+
+namespace linden {
+
+using Eigen::VectorXd;
+using reference::PlainScene;
+
+namespace {
+
+constexpr double kTurns = 0.5;  // of a body within a step: from there on the step does not represent the motion [rad]
+
+std::string at(const EverydayScene& scene, std::size_t node) {
+  return fmt::format("step {} ({:.4g} s)", node, static_cast<double>(node) * scene.options.step);
+}
+
+std::string row_name(const EverydayScene& scene, Index row) { return scene.model->names.velocity[static_cast<std::size_t>(row)]; }
+
+/// Largest turn of a body within the step that follows.
+double turn_within(PlainScene plain, double step) {
+  constexpr int kParts = 8;
+  std::vector<double> turns(plain.tree().bodies.size(), 0.0);
+  for (int part = 0; part < kParts; ++part) {
+    plain.advance(step / kParts, 2);
+    const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);
+    for (std::size_t i = 0; i < turns.size(); ++i) turns[i] += motions[i].w.norm() * step / kParts;
+  }
+  return *std::ranges::max_element(turns);
+}
+
+/// Where the plain simulator is at four times up to the horizon, and what its motion says about errors.
+struct Track {
+  std::vector<VectorXd> q;
+  double bent = 0;    // sum over steps of the second difference of velocities
+  VectorXd sudden;    // changes of velocity that sudden effects gave
+};
+
+constexpr std::int64_t kLooks = 4;
+
+Track track(PlainScene plain, const EverydayScene& scene, int parts) {
+  Track result;
+  const double h = scene.options.step;
+  VectorXd before = plain.v, earlier = plain.v;
+  for (std::int64_t k = 1; k <= scene.horizon; ++k) {
+    plain.advance(h, parts);
+    if (k > 1) result.bent += size_of(*scene.model, plain.v - 2 * before + earlier);
+    earlier = before;
+    before = plain.v;
+    if (k * kLooks / scene.horizon > (k - 1) * kLooks / scene.horizon) result.q.push_back(plain.q);
+  }
+  result.sudden = plain.sudden;
+  return result;
+}
+
+/// The engine at the same times, at h / halved.
+std::vector<VectorXd> looks(const EverydayScene& scene, int halved) {
+  Simulation simulation = simulation_of(scene, scene.options.step / halved);
+  std::vector<VectorXd> result;
+  for (std::int64_t k = 1; k <= scene.horizon; ++k) {
+    for (int part = 0; part < halved; ++part) {
+      if (!simulation.step().ok()) return {};
+    }
+    if (k * kLooks / scene.horizon > (k - 1) * kLooks / scene.horizon) result.push_back(vector_of(simulation.positions()));
+  }
+  return result;
+}
+
+double apart(const EverydayScene& scene, const reference::PlainTree& tree, const VectorXd& a, const VectorXd& b) {
+  return size_of(*scene.model, mean_velocity(tree, a, b, 1));
+}
+
+double apart(const EverydayScene& scene, const reference::PlainTree& tree, const std::vector<VectorXd>& a, const std::vector<VectorXd>& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) most = std::max(most, apart(scene, tree, a[k], b[k]));
+  return most;
+}
+
+VectorXd random_rows(Random& random, Eigen::Index rows) {
+  VectorXd result(rows);
+  for (double& x : result) x = random.uniform(-1, 1);
+  return result;
+}
+
+}  // namespace
+
+void check_refused(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  if (walk.failed.ok()) return;
+  const Node& last = walk.nodes.back();
+  const auto steps = walk.nodes.size() - 1;
+  const double turn = turn_within(plain_of(scene, last.q, last.v, static_cast<double>(steps) * scene.options.step), scene.options.step);
+  if (turn > kTurns) return;
+  constexpr std::array<const char*, 5> kStatus{"", "not converged", "past pi", "gains energy", "not finite"};
+  found.add(Check::refused, kStatus[static_cast<std::size_t>(walk.failed.status)],
+            fmt::format("{} is refused: {}; expected a step: bodies turn by {:.1e} rad at most within it", at(scene, steps), walk.failure,
+                        turn));
+}
+
+void check_position(const EverydayScene& scene, Differences& found) {
+  if (scene.stiff) return;
+  const PlainScene start = plain_of(scene);
+  const reference::PlainTree& tree = start.tree();
+  const double h = scene.options.step, duration = static_cast<double>(scene.horizon) * h;
+  const std::vector<VectorXd> whole = looks(scene, 1), half = looks(scene, 2);
+  if (whole.empty() || half.empty()) return;  // refused
+  const int parts = scene.sudden ? 16 : 2 * std::max(1, static_cast<int>(std::ceil(2 * start.stiffest_rate() * h)));
+  const Track plain = track(start, scene, parts), coarse = track(start, scene, parts / 2);
+  Random random(scene.seed ^ (scene.number << 20));
+  double floor = 4 * apart(scene, tree, plain.q, coarse.q) + 1e-10 * (1 + size_of(*scene.model, start.v) * duration);
+  double bound, bound_half;
+  if (!scene.sudden) {
+    // what the motion makes of a small change of its start, over what it would do by itself
+    constexpr double kSmall = 1e-6;
+    PlainScene other = start;
+    other.start(start.q, start.v + kSmall / duration * random_rows(random, start.v.size()));
+    const double growth = std::max(1.0, apart(scene, tree, track(other, scene, parts / 2).q, coarse.q) / kSmall);
+    bound = 2 * h * plain.bent * growth;
+    bound_half = bound / 2;  // each jump of a force is there at any step: first order of its own
+  } else {
+    // of a step's size, both ways: what sudden events then do
+    double spread = 0;
+    const VectorXd within = h * start.acceleration();
+    for (const double way : {0.5, -0.5}) {
+      PlainScene other = start;
+      const VectorXd kick = way * within.cwiseProduct(random_rows(random, within.size()));
+      other.start(reference::advanced(tree, start.q, way * h * start.v), start.v + kick);
+      spread = std::max(spread, apart(scene, tree, track(other, scene, parts / 2).q, coarse.q));
+    }
+    bound = 2 * (h * size_of(*scene.model, plain.sudden) + h * plain.bent + spread);
+    bound_half = bound / 2 + 0.2 * spread;
+  }
+  const double error = apart(scene, tree, plain.q, whole), error_half = apart(scene, tree, plain.q, half);
+  const char* order = scene.sudden ? "sudden" : "smooth";
+  if (!(error <= bound + floor)) {
+    found.add(Check::position, order,
+              fmt::format("positions within {} steps are off the plain simulator's by {:.3g} (rad, or 0.2 m); expected {:.3g} at most; with "
+                          "half the step {:.3g}",
+                          scene.horizon, error, bound + floor, error_half));
+  } else if (!(error_half <= bound_half + floor)) {
+    found.add(Check::position, fmt::format("{}, half the step", order),
+              fmt::format("positions within {} half steps are off the plain simulator's by {:.3g}; expected {:.3g} at most; with the whole "
+                          "step {:.3g}",
+                          2 * scene.horizon, error_half, bound_half + floor, error));
+  } else if (!scene.sudden && !scene.bends && error > 20 * floor && !(error_half <= 0.35 * error + floor)) {
+    found.add(Check::position, "order",
+              fmt::format("positions are off the plain simulator's by {:.3g}, with half the step by {:.3g}; expected a quarter of it", error,
+                          error_half));
+  }
+}
+
+namespace {
+
+/// Each time a joint with friction stops, starts or turns it does so within a step: h f at a speed of up to h f / inertia.
+double turning_points(const EverydayScene& scene, const Walk& walk) {
+  if (scene.effects.friction.empty()) return 0;
+  const PlainScene plain = plain_of(scene);
+  const std::vector<Index> position = reference::position_rows(plain.tree());
+  const VectorXd inertia = plain.row_inertia();
+  double sum = 0;
+  for (const JointFriction& friction : scene.effects.friction) {
+    const Index row = position[static_cast<std::size_t>(friction.row)];
+    const double impulse = scene.options.step * friction.force;
+    double way = 0;
+    for (std::size_t k = 1; k < walk.nodes.size(); ++k) {
+      const double moved = walk.nodes[k].q[row] - walk.nodes[k - 1].q[row], now = moved > 0 ? 1 : moved < 0 ? -1 : 0;
+      if (now != way) sum += impulse * impulse / inertia[friction.row];
+      way = now;
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+void check_energy(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  if (walk.nodes.size() < 8) return;
+  const double h = scene.options.step;
+  // of the change of velocities that smooth forces and friction give in a step
+  double second_order = 0, kinetic = 0, most = 0, least = 0, moved = 0;
+  const std::size_t stride = std::max<std::size_t>(1, walk.nodes.size() / 24);
+  for (std::size_t k = 0; k < walk.nodes.size(); ++k) {
+    const Node& node = walk.nodes[k];
+    kinetic = std::max(kinetic, node.energy.kinetic);
+    const double potential = node.energy.potential - walk.nodes[0].energy.potential;
+    most = std::max(most, potential);
+    least = std::min(least, potential);
+    moved = std::max(moved, node.work.magnitude());
+    if (k % stride != 0) continue;
+    const PlainScene plain = plain_of(scene, node.q, node.v, static_cast<double>(k) * h);
+    VectorXd change = h * plain.acceleration();
+    const VectorXd inertia = plain.row_inertia();
+    double sum = 0.5 * change.dot(plain.mass_matrix() * change);
+    for (const JointFriction& friction : scene.effects.friction) sum += 0.5 * h * h * friction.force * friction.force / inertia[friction.row];
+    if (scene.effects.ground) {
+      const double push = scene.effects.ground->stiffness;
+      const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);
+      const reference::PlainForces forces(plain.tree(), scene.effects, scene.options.gravity);
+      for (const auto& contact : forces.contacts(motions)) {
+        const double depth = std::max(-contact.gap, 0.0) + h * std::abs(motions[static_cast<std::size_t>(contact.slot)].velocity.norm());
+        if (contact.gap > 0) continue;
+        const double mass = scene.model->constants.inertia(contact.slot, 0);
+        sum += 0.5 * h * h * push * push * depth * depth / mass;
+      }
+    }
+    second_order = std::max(second_order, sum);
+  }
+  const double scale = kinetic + (most - least) + moved;
+  const double allowed = 1e-8 * scale + 4 * second_order + turning_points(scene, walk);
+
+  const double first = walk.nodes[0].balance();
+  // a blow may be booked a step or two after it: what stays counts
+  constexpr std::size_t kStays = 4;
+  double worst = 0;
+  std::size_t where = 0;
+  for (std::size_t k = 0; k + kStays <= walk.nodes.size(); ++k) {
+    double stays = std::numeric_limits<double>::infinity();
+    for (std::size_t j = k; j < k + kStays; ++j) stays = std::min(stays, std::abs(walk.nodes[j].balance() - first));
+    if (!(stays <= worst)) {
+      worst = stays;
+      where = k;
+    }
+  }
+  if (!(worst <= allowed)) {
+    found.add(Check::energy, "ledger",
+              fmt::format("{}: energy and what was taken less what was given strays by {:.3g} J; expected {:.3g} J at most (energies of "
+                          "{:.3g} J)",
+                          at(scene, where), walk.nodes[where].balance() - first, allowed, scale));
+  }
+  const auto gives = [&](const char* effect, double EffectWork<double>::* taken, bool there) {
+    if (!there) return;
+    double peak = 0, drop = 0;
+    std::size_t place = 0;
+    for (std::size_t k = 0; k < walk.nodes.size(); ++k) {
+      const double now = walk.nodes[k].work.*taken;
+      peak = std::max(peak, now);
+      if (!(peak - now <= drop)) {
+        drop = peak - now;
+        place = k;
+      }
+    }
+    if (!(drop <= allowed)) {
+      found.add(Check::energy, fmt::format("{} gives", effect),
+                fmt::format("{}: {} gave {:.3g} J; expected nothing, {:.3g} J at most (energies of {:.3g} J)", at(scene, place), effect, drop,
+                            allowed, scale));
+    }
+  };
+  gives("damping", &EffectWork<double>::damping, !scene.effects.damping.empty());
+  gives("friction", &EffectWork<double>::friction, !scene.effects.friction.empty());
+  gives("a limit", &EffectWork<double>::limits, !scene.effects.limits.empty());
+  gives("drag", &EffectWork<double>::drag, !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
+  gives("ground", &EffectWork<double>::ground, scene.effects.ground.has_value());
+}
+
+namespace {
+
+/// Velocities read at a node, beside the means of the two steps before and the two after it.
+class Reader {
+ public:
+  Reader(const EverydayScene& scene, const Walk& walk, const char* who) : scene_(scene), who_(who), plain_(plain_of(scene)) {
+    double kinetic = 0;
+    for (const Node& node : walk.nodes) kinetic = std::max(kinetic, node.energy.kinetic);
+    // the solver's tolerance is of the root of the energy, which may all be one row's
+    known_ = (2 * kinetic * plain_.row_inertia().cwiseInverse()).cwiseSqrt() * 1e-8;
+    known_.array() += 3e-6;
+    first_.resize(known_.size());
+    count_.setOnes(known_.size());
+    for (Index i = 1; i < plain_.tree().slots(); ++i) {
+      const reference::PlainBody& body = plain_.tree().body(i);
+      for (Index k = 0; k < body.dofs(); ++k) {
+        first_[body.v + k] = body.v + (k < 3 ? 0 : 3);
+        if (body.kind != JointKind::screw) count_[body.v + k] = 3;
+      }
+    }
+  }
+
+  /// q: five positions, v at the middle one.
+  void look(std::size_t node, const std::array<const VectorXd*, 5>& q, const VectorXd& v, Differences& found) const {
+    std::array<VectorXd, 4> mean;
+    for (std::size_t k = 0; k < 4; ++k) mean[k] = mean_velocity(plain_.tree(), *q[k], *q[k + 1], scene_.options.step);
+    std::array<VectorXd, 3> change;
+    for (std::size_t k = 0; k < 3; ++k) change[k] = mean[k + 1] - mean[k];
+    for (Index row = 0; row < v.size(); ++row) {
+      double speed = 0, bend = 0;
+      for (std::size_t k = 0; k < 4; ++k) speed = std::max(speed, std::abs(mean[k][row]));
+      // the three rows of an angular or of a linear velocity are one vector, in a frame that turns
+      for (const VectorXd& one : change) bend = std::max(bend, 2 * one.segment(first_[row], count_[row]).norm());
+      const double middle = 0.5 * (mean[1][row] + mean[2][row]);
+      if (!std::isfinite(v[row])) {
+        found.add(Check::velocity, fmt::format("{}: not finite", who_), fmt::format("{}: {} reads {}", at(scene_, node), row_name(scene_, row), v[row]));
+      } else if (speed <= 0.1 * known_[row]) {
+        if (std::abs(v[row]) <= known_[row]) continue;
+        found.add(Check::rest, fmt::format("{}: rests and reads a speed", who_),
+                  fmt::format("{}: {} stands still and reads {:.3g} per s; expected {:.1g} at most", at(scene_, node), row_name(scene_, row),
+                              v[row], known_[row]));
+      } else if (!(std::abs(v[row] - middle) <= bend + known_[row])) {
+        found.add(Check::velocity, fmt::format("{}: not the motion's", who_),
+                  fmt::format("{}: {} reads {:.6g} per s; expected {:.6g}, that of the positions around it, within {:.2g}", at(scene_, node),
+                              row_name(scene_, row), v[row], middle, bend + known_[row]));
+      }
+    }
+    for (const JointLimit& limit : scene_.effects.limits) after_blow(limit, node, *q[2], mean, v, found);
+  }
+
+ private:
+  /// On a limit: the velocity is that with which it goes on.
+  void after_blow(const JointLimit& limit, std::size_t node, const VectorXd& q, const std::array<VectorXd, 4>& mean, const VectorXd& v,
+                  Differences& found) const {
+    const Index row = limit.row;
+    const double place = q[reference::position_rows(plain_.tree())[static_cast<std::size_t>(row)]];
+    const bool low = std::abs(place - limit.lower) < 1e-12, high = std::abs(place - limit.upper) < 1e-12;
+    if (!low && !high) return;
+    const double on = mean[2][row], slack = 2 * std::abs(mean[3][row] - on) + known_[row];
+    if (std::abs(v[row] - on) <= slack) return;
+    found.add(Check::rest, fmt::format("{}: speed on a limit", who_),
+              fmt::format("{}: {} is on its limit and reads {:.6g} per s; expected {:.6g}, with which it goes on, within {:.2g}",
+                          at(scene_, node), row_name(scene_, row), v[row], on, slack));
+  }
+
+  const EverydayScene& scene_;
+  std::string who_;
+  PlainScene plain_;
+  VectorXd known_;
+  Eigen::VectorXi first_, count_;
+};
+
+}  // namespace
+
+void check_velocities(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  const std::size_t nodes = walk.nodes.size();
+  if (nodes < 5) return;
+  const Reader reader(scene, walk, "simulation");
+  // every node where the motion begins and ends, some between
+  const std::size_t stride = std::max<std::size_t>(1, nodes / 64);
+  for (std::size_t k = 2; k + 2 < nodes; ++k) {
+    if (k > 48 && k + 24 < nodes && k % stride != 0) continue;
+    reader.look(k, {&walk.nodes[k - 2].q, &walk.nodes[k - 1].q, &walk.nodes[k].q, &walk.nodes[k + 1].q, &walk.nodes[k + 2].q}, walk.nodes[k].v,
+                found);
+  }
+}
+
+void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  if (!walk.failed.ok()) return;
+  BatchOptions options;
+  static_cast<Options&>(options) = scene.options;
+  options.threads = 1;
+  Batch batch(scene.model, 1, options, scene.effects);
+  batch.reset(0, scene.start.positions, scene.start.velocities);
+  const Reader reader(scene, walk, "batch");
+  std::int64_t taken = 0;
+  for (const std::int64_t until : {scene.horizon, scene.steps}) {
+    batch.step(until - taken - 4);
+    taken = until;
+    std::array<VectorXd, 5> q;
+    VectorXd v;
+    for (std::size_t k = 0; k < 5; ++k) {
+      if (k > 0) batch.step(1);
+      q[k] = batch.positions().instance(0);
+      if (k == 2) v = batch.observe().velocities().instance(0);
+    }
+    if (batch.record(0).status != StepStatus::converged) {
+      // a Simulation took these steps
+      found.add(Check::refused, "batch alone", fmt::format("in a batch: {}; expected what a Simulation takes", batch.describe(0)));
+      return;
+    }
+    reader.look(static_cast<std::size_t>(until - 2), {&q[0], &q[1], &q[2], &q[3], &q[4]}, v, found);
+    if (scene.steps - scene.horizon < 8) return;
+  }
+}
+
+}  // namespace linden
