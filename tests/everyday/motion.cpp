@@ -116,11 +116,11 @@ void check_position(const EverydayScene& scene, Differences& found) {
   double bound, bound_half;
   if (!scene.sudden) {
     // what the motion makes of a small change of its start, over what it would do by itself
-    constexpr double kSmall = 1e-6;
+    constexpr double kSmall = 1e-6, kSmooth = 4;
     PlainScene other = start;
     other.start(start.q, start.v + kSmall / duration * random_rows(random, start.v.size()));
     const double growth = std::max(1.0, apart(scene, tree, track(other, scene, parts / 2).q, coarse.q) / kSmall);
-    bound = 2 * h * plain.bent * growth;
+    bound = kSmooth * h * plain.bent * growth;
     bound_half = bound / 2;  // each jump of a force is there at any step: first order of its own
   } else {
     // of a step's size, both ways: what sudden events then do
@@ -137,12 +137,14 @@ void check_position(const EverydayScene& scene, Differences& found) {
   }
   const double error = apart(scene, tree, plain.q, whole), error_half = apart(scene, tree, plain.q, half);
   const char* order = scene.sudden ? "sudden" : "smooth";
-  if (!(error <= bound + floor)) {
+  // thin bodies turn their motion's errors into large ones about their length; they are of second order all the same
+  const bool second = !scene.sudden && !scene.bends && error <= 20 * bound + floor && error_half <= 0.35 * error + floor;
+  if (!(error <= bound + floor) && !second) {
     found.add(Check::position, order,
               fmt::format("positions within {} steps are off the plain simulator's by {:.3g} (rad, or 0.2 m); expected {:.3g} at most; with "
                           "half the step {:.3g}",
                           scene.horizon, error, bound + floor, error_half));
-  } else if (!(error_half <= bound_half + floor)) {
+  } else if (!(error_half <= bound_half + floor) && !second) {
     found.add(Check::position, fmt::format("{}, half the step", order),
               fmt::format("positions within {} half steps are off the plain simulator's by {:.3g}; expected {:.3g} at most; with the whole "
                           "step {:.3g}",
@@ -156,8 +158,9 @@ void check_position(const EverydayScene& scene, Differences& found) {
 
 namespace {
 
-/// Each time a joint with friction stops, starts or turns it does so within a step: h f at a speed of up to h f / inertia.
-double turning_points(const EverydayScene& scene, const Walk& walk) {
+/// Joint friction acts at the beginning of a step, half a step early (kernels/effects/friction.hpp): a first order of its own, h f |v|. Each
+/// time a joint stops, starts or turns it does so within a step: h f at a speed of up to h f / inertia.
+double friction_leaves(const EverydayScene& scene, const Walk& walk) {
   if (scene.effects.friction.empty()) return 0;
   const PlainScene plain = plain_of(scene);
   const std::vector<Index> position = reference::position_rows(plain.tree());
@@ -166,12 +169,14 @@ double turning_points(const EverydayScene& scene, const Walk& walk) {
   for (const JointFriction& friction : scene.effects.friction) {
     const Index row = position[static_cast<std::size_t>(friction.row)];
     const double impulse = scene.options.step * friction.force;
-    double way = 0;
+    double way = 0, most = 0;
     for (std::size_t k = 1; k < walk.nodes.size(); ++k) {
       const double moved = walk.nodes[k].q[row] - walk.nodes[k - 1].q[row], now = moved > 0 ? 1 : moved < 0 ? -1 : 0;
       if (now != way) sum += impulse * impulse / inertia[friction.row];
       way = now;
+      most = std::max(most, std::abs(moved));
     }
+    sum += friction.force * most;
   }
   return sum;
 }
@@ -191,7 +196,7 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
     most = std::max(most, potential);
     least = std::min(least, potential);
     moved = std::max(moved, node.work.magnitude());
-    if (k % stride != 0) continue;
+    if (k % stride != 0 && k > 40) continue;
     const PlainScene plain = plain_of(scene, node.q, node.v, static_cast<double>(k) * h);
     VectorXd change = h * plain.acceleration();
     const VectorXd inertia = plain.row_inertia();
@@ -202,16 +207,17 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
       const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);
       const reference::PlainForces forces(plain.tree(), scene.effects, scene.options.gravity);
       for (const auto& contact : forces.contacts(motions)) {
-        const double depth = std::max(-contact.gap, 0.0) + h * std::abs(motions[static_cast<std::size_t>(contact.slot)].velocity.norm());
         if (contact.gap > 0) continue;
+        // of the push, and of its change along the way
         const double mass = scene.model->constants.inertia(contact.slot, 0);
-        sum += 0.5 * h * h * push * push * depth * depth / mass;
+        const double way = h * motions[static_cast<std::size_t>(contact.slot)].velocity.norm(), impulse = h * push * (way - contact.gap);
+        sum += 0.5 * impulse * impulse / mass + push * way * way;
       }
     }
     second_order = std::max(second_order, sum);
   }
   const double scale = kinetic + (most - least) + moved;
-  const double allowed = 1e-8 * scale + 4 * second_order + turning_points(scene, walk);
+  const double allowed = 1e-8 * scale + 8 * second_order + friction_leaves(scene, walk);
 
   const double first = walk.nodes[0].balance();
   // a blow may be booked a step or two after it: what stays counts
@@ -266,7 +272,9 @@ class Reader {
     double kinetic = 0;
     for (const Node& node : walk.nodes) kinetic = std::max(kinetic, node.energy.kinetic);
     // the solver's tolerance is of the root of the energy, which may all be one row's
-    known_ = (2 * kinetic * plain_.row_inertia().cwiseInverse()).cwiseSqrt() * 1e-8;
+    inertia_ = plain_.row_inertia();
+    most_ = (2 * kinetic * inertia_.cwiseInverse()).cwiseSqrt();
+    known_ = 1e-8 * most_;
     known_.array() += 3e-6;
     first_.resize(known_.size());
     count_.setOnes(known_.size());
@@ -283,6 +291,15 @@ class Reader {
   void look(std::size_t node, const std::array<const VectorXd*, 5>& q, const VectorXd& v, Differences& found) const {
     std::array<VectorXd, 4> mean;
     for (std::size_t k = 0; k < 4; ++k) mean[k] = mean_velocity(plain_.tree(), *q[k], *q[k + 1], scene_.options.step);
+    // of second order are momenta too: ad_V^T ad_V^T G V h^2 / 12 of a body that turns and moves on
+    double turn = 0, moving = 0;
+    const auto motions = reference::body_motions(plain_.tree(), *q[2], mean[1]);
+    for (std::size_t i = 1; i < motions.size(); ++i) {
+      const reference::PlainBody& body = plain_.tree().bodies[i];
+      turn = std::max(turn, motions[i].w.norm());
+      moving += body.mass() * motions[i].velocity_at(motions[i].world(reference::center_of(body))).squaredNorm();
+    }
+    const double step = scene_.options.step;
     std::array<VectorXd, 3> change;
     for (std::size_t k = 0; k < 3; ++k) change[k] = mean[k + 1] - mean[k];
     for (Index row = 0; row < v.size(); ++row) {
@@ -290,6 +307,7 @@ class Reader {
       for (std::size_t k = 0; k < 4; ++k) speed = std::max(speed, std::abs(mean[k][row]));
       // the three rows of an angular or of a linear velocity are one vector, in a frame that turns
       for (const VectorXd& one : change) bend = std::max(bend, 2 * one.segment(first_[row], count_[row]).norm());
+      bend += step * step * turn * (0.25 * turn * most_[row] + moving / (3 * inertia_[row]));
       const double middle = 0.5 * (mean[1][row] + mean[2][row]);
       if (!std::isfinite(v[row])) {
         found.add(Check::velocity, fmt::format("{}: not finite", who_), fmt::format("{}: {} reads {}", at(scene_, node), row_name(scene_, row), v[row]));
@@ -325,7 +343,7 @@ class Reader {
   const EverydayScene& scene_;
   std::string who_;
   PlainScene plain_;
-  VectorXd known_;
+  VectorXd inertia_, most_, known_;  // of rows; what all energy would give one; what is known of it
   Eigen::VectorXi first_, count_;
 };
 
