@@ -162,15 +162,15 @@ struct BatchOf<Real>::Data {
     });
   }
 
-  /// A number an entry of an effect and instance, at first the entries' own.
-  template <class Entry>
-  BatchView<Real> numbers_of(Numbers<Real>& numbers, const std::vector<Entry>& entries, double Entry::*own) {
+  /// A number an entry of an effect and instance, at first own(entry).
+  template <class Entry, class Own>
+  BatchView<Real> numbers_of(Numbers<Real>& numbers, const std::vector<Entry>& entries, const Own& own) {
     if (numbers.empty()) {
       numbers.resize(at(blocks, count_of(entries)));
       for_blocks([&](std::int64_t b, Worker&) {
         Real* to = numbers.data() + at(b, count_of(entries));
         for (const Entry& entry : entries) {
-          for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(entry.*own);
+          for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(own(entry));
         }
       });
     }
@@ -287,12 +287,14 @@ BatchView<Real> BatchOf<Real>::forces() {
 
 template <class Real>
 BatchView<Real> BatchOf<Real>::servo_targets() {
-  return data_->numbers_of(data_->targets, data_->plan.effects.servos, &Servo::target);
+  return data_->numbers_of(data_->targets, data_->plan.effects.servos, [](const Servo& servo) {
+    return servo.target_moves() ? std::numeric_limits<double>::quiet_NaN() : servo.target;
+  });
 }
 
 template <class Real>
 BatchView<Real> BatchOf<Real>::friction() {
-  return data_->numbers_of(data_->frictions, data_->plan.effects.friction, &JointFriction::force);
+  return data_->numbers_of(data_->frictions, data_->plan.effects.friction, [](const JointFriction& entry) { return entry.force; });
 }
 
 template <class Real>

@@ -104,6 +104,8 @@ class BatchOf {
   BatchView<Real> forces();
 
   /// Targets of the servos [rad, m] in the order of Effects::servos, likewise: rows to be written at will, at first those of the effects.
+  /// Of a servo whose target is a table the row holds NaN until a number is written, which then goes over the table; NaN gives the servo
+  /// back to it.
   BatchView<Real> servo_targets();
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none may be negative.
   BatchView<Real> friction();

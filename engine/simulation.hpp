@@ -62,8 +62,9 @@ class Simulation {
   /// Conjugate to the velocities: of a ball or free joint moment, then force, in the body's frame.
   void set_forces(std::span<const double> force);
 
-  /// Targets of the servos [rad, m], in the order of Effects::servos, the same over every step until they are set anew. Throws InputError
-  /// for a wrong count or a number that is not finite.
+  /// Targets of the servos [rad, m], in the order of Effects::servos, the same over every step until they are set anew. Where the effects
+  /// have a table the number goes over it from now on, and NaN gives the servo back to its table; target velocity and feed-forward go on
+  /// as the effects say. Throws InputError for a wrong count or another number that is not finite.
   void set_servo_targets(std::span<const double> targets);
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none negative.
   void set_friction(std::span<const double> forces);

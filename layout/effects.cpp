@@ -79,14 +79,36 @@ std::vector<Entry> carried(const Model& model, const std::vector<Entry>& list, c
 }
 
 template <class Entry>
-std::vector<Entry> everywhere(const Model& model, double value, bool balls) {
+std::vector<Entry> everywhere(const Model& model, double Entry::*member, double value, bool balls) {
   const RowFacts facts(model);
   std::vector<Entry> list;
   for (Index row = 0; row < facts.count(); ++row) {
     const JointKind kind = facts.kind(row);
-    if (kind == JointKind::screw || (balls && kind == JointKind::ball)) list.push_back({row, value});
+    if (kind != JointKind::screw && !(balls && kind == JointKind::ball)) continue;
+    Entry& entry = list.emplace_back();
+    entry.row = row;
+    entry.*member = value;
   }
   return on_leaders(model, list);
+}
+
+/// The first point after `time`.
+std::size_t first_after(const Course& course, double time) {
+  return static_cast<std::size_t>(std::ranges::upper_bound(course.times, time) - course.times.begin());
+}
+
+/// The line that ends at point k, at `time`; before the first point and after the last it is level.
+double on_piece(const Course& course, std::size_t k, double time) {
+  if (k == 0) return course.values.front();
+  if (k == course.times.size()) return course.values.back();
+  const double share = (time - course.times[k - 1]) / (course.times[k] - course.times[k - 1]);
+  return course.values[k - 1] + share * (course.values[k] - course.values[k - 1]);
+}
+
+/// By how much the ends of a step and the times that people give may miss each other by rounding alone: each is a product or a sum of few.
+double rounding_of(double begin, double end) {
+  constexpr double kRoundings = 8;
+  return kRoundings * std::numeric_limits<double>::epsilon() * std::max(std::abs(begin), std::abs(end));
 }
 
 /// Looks at effects one by one and says which one is wrong.
@@ -135,12 +157,16 @@ class Checker {
       if (!(entry.restitution >= 0 && entry.restitution <= 1)) {
         fail(fmt::format("restitution is {}", entry.restitution), "0 to 1", "0 stops, 1 bounces back at the same speed");
       }
+      if (!(entry.velocity >= 0)) fail(fmt::format("velocity is {}", entry.velocity), "zero or more", "infinity is no limit");
     });
     once("servos", effects_.servos, [&](const Servo& entry) {
       require_screw(entry.row);
       not_negative("stiffness", entry.stiffness);
       not_negative("damping", entry.damping);
       finite("target", entry.target);
+      if (entry.target_moves() || !entry.target_over_time.values.empty()) require_course("target_over_time", entry.target_over_time);
+      require_course("target_velocity", entry.target_velocity);
+      require_course("feedforward", entry.feedforward);
       if (!(entry.max_force >= 0)) fail(fmt::format("max_force is {}", entry.max_force), "zero or more", "infinity is no limit");
     });
     each("torques", effects_.torques, [&](const JointTorque& entry) {
@@ -308,13 +334,34 @@ class Checker {
 
 }  // namespace
 
-double Course::at(double time) const {
-  const auto after = std::ranges::upper_bound(times, time);
-  if (after == times.begin()) return values.front();
-  if (after == times.end()) return values.back();
-  const auto k = static_cast<std::size_t>(after - times.begin());
-  const double share = (time - times[k - 1]) / (times[k] - times[k - 1]);
-  return values[k - 1] + share * (values[k] - values[k - 1]);
+double Course::at(double time) const { return on_piece(*this, first_after(*this, time), time); }
+
+double Course::mean(double begin, double end) const {
+  const double slack = rounding_of(begin, end), length = end - begin, last = end - slack;
+  std::size_t k = first_after(*this, begin + slack);
+  const auto ends = [&] { return k == times.size() || times[k] >= last; };
+  if (ends()) return on_piece(*this, k, begin + 0.5 * length);
+  double sum = 0;
+  for (double from = begin;; ++k) {
+    const bool whole = ends();
+    const double to = whole ? end : times[k];
+    if (to > from) sum += (to - from) * on_piece(*this, k, from + 0.5 * (to - from));
+    if (whole) return sum / length;
+    from = to;
+  }
+}
+
+bool Servo::target_moves() const { return !target_over_time.times.empty(); }
+
+double Servo::target_at(double time) const { return target_moves() ? target_over_time.at(time) : target; }
+
+double BodyWrench::share_at(double time) const { return time >= from && time < to ? scale.at(time) : 0; }
+
+double BodyWrench::mean_share(double begin, double end) const {
+  const double slack = rounding_of(begin, end);
+  const double first = from <= begin + slack ? begin : from, last = to >= end - slack ? end : to;
+  if (!(last - first > slack)) return 0;
+  return (last - first) / (end - begin) * scale.mean(first, last);
 }
 
 Index row_of(const Model& model, const std::string& joint) {
@@ -379,12 +426,14 @@ std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLi
         entry.lower = (entry.lower - mimic.offset) / mimic.multiplier;
         entry.upper = (entry.upper - mimic.offset) / mimic.multiplier;
         if (mimic.multiplier < 0) std::swap(entry.lower, entry.upper);
+        entry.velocity /= std::abs(mimic.multiplier);
         return entry;
       },
       [](JointLimit& into, const JointLimit& other) {
         into.lower = std::max(into.lower, other.lower);
         into.upper = std::min(into.upper, other.upper);
         into.restitution = std::min(into.restitution, other.restitution);
+        into.velocity = std::min(into.velocity, other.velocity);
       });
   for (const JointLimit& limit : result) {
     if (limit.lower > limit.upper) {
@@ -417,27 +466,32 @@ std::vector<JointFriction> urdf_friction(const Model& model) {
   return on_leaders(model, list);
 }
 
-std::vector<JointLimit> urdf_limits(const Model& model, double restitution) {
+std::vector<JointLimit> urdf_limits(const Model& model, double restitution, bool velocities) {
   const RowFacts facts(model);
   std::vector<JointLimit> list;
   for (Index row = 0; row < facts.count(); ++row) {
     const double lower = model.attributes.lower(row), upper = model.attributes.upper(row);
-    const bool any = std::isfinite(lower) || std::isfinite(upper);
-    if (any && facts.kind(row) == JointKind::screw) list.push_back({row, lower, upper, restitution});
+    const double velocity = velocities ? model.attributes.max_velocity(row) : kInfinity;
+    const bool any = std::isfinite(lower) || std::isfinite(upper) || std::isfinite(velocity);
+    if (any && facts.kind(row) == JointKind::screw) list.push_back({row, lower, upper, restitution, velocity});
   }
   return on_leaders(model, list);
 }
 
 std::vector<Armature> armature_everywhere(const Model& model, double inertia) {
-  return everywhere<Armature>(model, inertia, false);
+  return everywhere(model, &Armature::inertia, inertia, false);
 }
 
 std::vector<JointDamping> damping_everywhere(const Model& model, double coefficient) {
-  return everywhere<JointDamping>(model, coefficient, true);
+  return everywhere(model, &JointDamping::coefficient, coefficient, true);
 }
 
 std::vector<JointFriction> friction_everywhere(const Model& model, double force) {
-  return everywhere<JointFriction>(model, force, false);
+  return everywhere(model, &JointFriction::force, force, false);
+}
+
+std::vector<JointLimit> velocity_limit_everywhere(const Model& model, double velocity) {
+  return everywhere(model, &JointLimit::velocity, velocity, false);
 }
 
 std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping, const std::vector<double>& positions) {

@@ -30,6 +30,9 @@ struct Course {
   std::vector<double> times{0};
   std::vector<double> values{0};
   double at(double time) const;
+  /// Mean over [begin, end], exactly. What lies at one of its ends but for the rounding of times lies there: a jump at 0.3 s is that of
+  /// the step from 3 x 0.1 s on.
+  double mean(double begin, double end) const;
 };
 
 /// Inertia of a rotor that a joint turns along.
@@ -67,15 +70,22 @@ struct JointLimit {
   double lower = -std::numeric_limits<double>::infinity();  // [rad, m]
   double upper = std::numeric_limits<double>::infinity();
   double restitution = 0;  // 0: stops, 1: bounces back at the same speed
+  double velocity = std::numeric_limits<double>::infinity();  // at most, either way [rad/s, m/s]
 };
 
-/// A force of stiffness (target - q) - damping qdot on a joint, at most max_force.
+/// A force of stiffness (target - q) + damping (target_velocity - qdot) + feedforward on a joint, at most max_force in all.
 struct Servo {
   Index row;
   double stiffness;    // [N m/rad, N/m]
   double damping = 0;  // [N m s/rad, N s/m]
   double target = 0;   // [rad, m]
   double max_force = std::numeric_limits<double>::infinity();  // [N m, N]
+  Course target_over_time{{}, {}};  // [rad, m]; goes over target where it has any points
+  Course target_velocity{};         // [rad/s, m/s]; that of a moving target is not taken from it
+  Course feedforward{};             // [N m, N]
+
+  bool target_moves() const;
+  double target_at(double time) const;
 };
 
 struct JointTorque {
@@ -93,6 +103,9 @@ struct BodyWrench {
   double from = -std::numeric_limits<double>::infinity();  // [s]
   double to = std::numeric_limits<double>::infinity();
   Course scale{{0}, {1}};          // force and moment over time, as shares of the above
+  double share_at(double time) const;
+  /// Mean of what acts over [begin, end], exactly; ends are as those of Course::mean.
+  double mean_share(double begin, double end) const;
 };
 
 /// -(linear + quadratic |v|) v at the centre of mass, v relative to the wind.
@@ -144,12 +157,14 @@ const LinkPlace& place_of(const Model& model, const std::string& link);
 /// What the robot's file says of its joints. A mimic joint's share is carried to the joint that leads it.
 std::vector<JointDamping> urdf_damping(const Model& model);
 std::vector<JointFriction> urdf_friction(const Model& model);
-std::vector<JointLimit> urdf_limits(const Model& model, double restitution = 0);
+/// Limits of position, with those of velocity or without: joints that the file limits neither way have no entry.
+std::vector<JointLimit> urdf_limits(const Model& model, double restitution = 0, bool velocities = false);
 
 /// The same on every joint: screws, for damping the rows of ball joints too. Mimic joints' shares are carried to their leaders.
 std::vector<Armature> armature_everywhere(const Model& model, double inertia);
 std::vector<JointDamping> damping_everywhere(const Model& model, double coefficient);
 std::vector<JointFriction> friction_everywhere(const Model& model, double force);
+std::vector<JointLimit> velocity_limit_everywhere(const Model& model, double velocity);
 
 /// On every screw joint that follows no other, no stronger than the file's effort limits, with `positions` [nq] for targets; empty:
 /// the zero configuration.
@@ -157,7 +172,8 @@ std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double
                                     const std::vector<double>& positions = {});
 
 /// Carries what stands on followers' rows to their leaders' (q_f = m q + o): inertia and damping times m^2, friction times |m|,
-/// limits through the map, the tighter ones and the smaller restitution where several meet. One entry a row is left, sorted by row.
+/// limits through the map, velocities by |m|, the tighter ones and the smaller restitution where several meet. One entry a row is left,
+/// sorted by row.
 /// Throws InputError where limits leave no room.
 std::vector<Armature> on_leaders(const Model& model, const std::vector<Armature>& list);
 std::vector<JointDamping> on_leaders(const Model& model, const std::vector<JointDamping>& list);

@@ -98,16 +98,30 @@ std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model)
         range_text(effects.ball_springs, [](const BallSpring& entry) { return entry.stiffness; }) + " N m/rad");
   }
   on_joints("limits", effects.limits, [&] {
-    return "restitution " + range_text(effects.limits, [](const JointLimit& entry) { return entry.restitution; });
+    std::string text = "restitution " + range_text(effects.limits, [](const JointLimit& entry) { return entry.restitution; });
+    if (std::ranges::any_of(effects.limits, [](const JointLimit& entry) { return std::isfinite(entry.velocity); })) {
+      text += fmt::format(", velocity {} {}", range_text(effects.limits, [](const JointLimit& entry) { return entry.velocity; }),
+                          unit_text(effects.limits, model, "rad/s", "m/s"));
+    }
+    return text;
   });
   on_joints("servo", effects.servos, [&] {
-    return fmt::format("stiffness {} {}, damping {} {}, force {} {}",
+    std::string over_time;
+    const auto count = [&](const char* what, const auto& has) {
+      const auto found = std::ranges::count_if(effects.servos, has);
+      if (found > 0) over_time += ", " + counted(found, what);
+    };
+    const auto acts = [](const Course& course) { return std::ranges::any_of(course.values, [](double value) { return value != 0; }); };
+    count("moving target", [](const Servo& entry) { return entry.target_moves(); });
+    count("target velocity", [&](const Servo& entry) { return acts(entry.target_velocity); });
+    count("feed-forward", [&](const Servo& entry) { return acts(entry.feedforward); });
+    return fmt::format("stiffness {} {}, damping {} {}, force {} {}{}",
                        range_text(effects.servos, [](const Servo& entry) { return entry.stiffness; }),
                        unit_text(effects.servos, model, "N m/rad", "N/m"),
                        range_text(effects.servos, [](const Servo& entry) { return entry.damping; }),
                        unit_text(effects.servos, model, "N m s/rad", "N s/m"),
                        range_text(effects.servos, [](const Servo& entry) { return entry.max_force; }),
-                       unit_text(effects.servos, model, "N m", "N"));
+                       unit_text(effects.servos, model, "N m", "N"), over_time);
   });
   on_joints("torque", effects.torques, [&] {
     const auto tables =
@@ -160,13 +174,16 @@ Json effects_json(const Effects& effects, const Model& model) {
     return Json{{"joint", joint(e.row)},
                 {"lower", number_or_null(e.lower)},
                 {"upper", number_or_null(e.upper)},
-                {"restitution", e.restitution}};
+                {"restitution", e.restitution},
+                {"velocity", number_or_null(e.velocity)}};
   });
   list("servo", effects.servos, [&](const Servo& e) {
     return Json{{"joint", joint(e.row)},
                 {"stiffness", e.stiffness},
                 {"damping", e.damping},
-                {"target", e.target},
+                {"target", e.target_moves() ? course(e.target_over_time) : Json(e.target)},
+                {"target_velocity", course(e.target_velocity)},
+                {"feedforward", course(e.feedforward)},
                 {"max_force", number_or_null(e.max_force)}};
   });
   list("torque", effects.torques, [&](const JointTorque& e) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -74,7 +75,10 @@ LeftOut::LeftOut(const Model& model, const Effects& effects) {
     limits += std::isfinite(model.attributes.lower(row)) || std::isfinite(model.attributes.upper(row)) ? 1 : 0;
     damping += model.attributes.damping(row) > 0 ? 1 : 0;
     friction += model.attributes.friction(row) > 0 ? 1 : 0;
+    velocity_limits += std::isfinite(model.attributes.max_velocity(row)) ? 1 : 0;
   }
+  const bool held = std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return std::isfinite(limit.velocity); });
+  if (effects.limits.empty() || held) velocity_limits = 0;
   if (!effects.limits.empty()) limits = 0;
   if (!effects.damping.empty()) damping = 0;
   if (!effects.friction.empty()) friction = 0;
@@ -85,6 +89,7 @@ std::string LeftOut::text() const {
   if (limits > 0) parts.push_back(fmt::format("limits of {}", counted(limits, "joint")));
   if (damping > 0) parts.push_back(fmt::format("damping of {}", damping));
   if (friction > 0) parts.push_back(fmt::format("friction of {}", friction));
+  if (velocity_limits > 0) parts.push_back(fmt::format("velocity limits of {}", velocity_limits));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 

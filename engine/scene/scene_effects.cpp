@@ -21,9 +21,9 @@ using Entry = SceneValue::Entry;
 const std::vector<std::string> kEffects{"gravity", "armature", "damping", "friction", "spring", "limits",
                                         "servo",   "torque",   "wrench",  "drag",     "ground"};
 const std::vector<std::string> kSpring{"stiffness", "rest"};
-const std::vector<std::string> kLimit{"lower", "upper", "restitution"};
-const std::vector<std::string> kServo{"stiffness", "damping", "max_force", "targets", "joints"};
-const std::vector<std::string> kServoJoint{"stiffness", "damping", "target", "max_force"};
+const std::vector<std::string> kLimit{"lower", "upper", "restitution", "velocity"};
+const std::vector<std::string> kServo{"stiffness", "damping", "max_force", "targets", "velocities", "feedforward", "joints"};
+const std::vector<std::string> kServoJoint{"stiffness", "damping", "target", "target_velocity", "feedforward", "max_force"};
 const std::vector<std::string> kCourse{"times", "values"};
 const std::vector<std::string> kWrench{"force", "moment", "point", "frame", "from", "to", "file"};
 const std::vector<std::string> kFrames{"world", "body"};
@@ -32,6 +32,7 @@ const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
+constexpr std::string_view kVelocityLimit = "urdf or a number";
 constexpr std::string_view kUrdfOrNumber = "urdf, a number or {joint: number}";
 
 std::array<double, 3> array_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -191,33 +192,66 @@ class Reader {
 
   void limits(const SceneValue& at) {
     std::vector<JointLimit>& list = result_.effects.limits;
-    double restitution = 0;
+    SharedLimits shared;
     bool named = false;
     if (!at.says("urdf")) {
-      const std::vector<Entry> entries = at.entries("urdf, {restitution: number} or {joint: {lower, upper, restitution}}");
-      if (const auto value = at.find("restitution")) restitution = restitution_of(*value);
+      const std::vector<Entry> entries =
+          at.entries("urdf, {restitution: number, velocity: urdf or number} or {joint: {lower, upper, restitution, velocity}}");
+      if (const auto value = at.find("restitution")) shared.restitution = restitution_of(*value);
+      if (const auto value = at.find("velocity")) {
+        shared.velocity_of_file = value->says("urdf");
+        if (!shared.velocity_of_file) shared.velocity = value->not_negative(kVelocityLimit);
+      }
       for (const Entry& entry : entries) {
-        if (entry.key == "restitution") continue;
+        if (entry.key == "restitution" || entry.key == "velocity") continue;
         named = true;
-        list.push_back(limit(entry, restitution));
+        list.push_back(limit(entry, shared));
       }
     }
-    at.located([&] { list = named ? on_leaders(model_, list) : urdf_limits(model_, restitution); });
+    at.located([&] { list = named ? on_leaders(model_, list) : limits_everywhere(shared); });
     if (list.empty()) warn("no joint has any");
+    const auto locked = std::ranges::find(list, 0.0, &JointLimit::velocity);
+    if (locked == list.end()) return;
+    warn(fmt::format("{} of {} joints cannot move ({}): their limit of velocity is 0", std::ranges::count(list, 0.0, &JointLimit::velocity),
+                     list.size(), linden::quoted(model_.names.velocity[static_cast<std::size_t>(locked->row)])));
   }
 
-  JointLimit limit(const Entry& entry, double restitution) const {
+  /// What stands beside the joints, for those that have no values of their own.
+  struct SharedLimits {
+    double restitution = 0;
+    bool velocity_of_file = false;
+    double velocity = std::numeric_limits<double>::infinity();
+  };
+
+  /// The file's, and a number for a velocity on every joint.
+  std::vector<JointLimit> limits_everywhere(const SharedLimits& shared) const {
+    std::vector<JointLimit> list = urdf_limits(model_, shared.restitution, shared.velocity_of_file);
+    if (!std::isfinite(shared.velocity)) return list;
+    for (JointLimit limit : velocity_limit_everywhere(model_, shared.velocity)) {
+      limit.restitution = shared.restitution;
+      list.push_back(limit);
+    }
+    return on_leaders(model_, list);
+  }
+
+  JointLimit limit(const Entry& entry, const SharedLimits& shared) const {
     const SceneValue& at = entry.value;
     const Index row = screw(entry).row;
-    JointLimit result{row, model_.attributes.lower(row), model_.attributes.upper(row), restitution};
+    JointLimit result{row, model_.attributes.lower(row), model_.attributes.upper(row), shared.restitution};
+    result.velocity = shared.velocity_of_file ? model_.attributes.max_velocity(row) : shared.velocity;
     if (!at.says("urdf")) {
       at.entries_of(kLimit);
       if (const auto value = at.find("lower")) result.lower = value->number();
       if (const auto value = at.find("upper")) result.upper = value->number();
       if (const auto value = at.find("restitution")) result.restitution = restitution_of(*value);
+      if (const auto value = at.find("velocity")) {
+        result.velocity = value->says("urdf") ? model_.attributes.max_velocity(row) : value->not_negative(kVelocityLimit);
+        if (!std::isfinite(result.velocity))
+          value->fail(fmt::format("the model's file limits no velocity of {}", linden::quoted(entry.key)), "a number", "write one");
+      }
     }
-    if (!std::isfinite(result.lower) && !std::isfinite(result.upper)) {
-      at.fail(fmt::format("{} has no limit and the model's file gives none", at.path()), "lower, upper or both",
+    if (!std::isfinite(result.lower) && !std::isfinite(result.upper) && !std::isfinite(result.velocity)) {
+      at.fail(fmt::format("{} has no limit and the model's file gives none", at.path()), "lower, upper, velocity or several of them",
               "add them, or leave the joint out");
     }
     if (result.lower > result.upper) {
@@ -265,7 +299,9 @@ class Reader {
       }
     }
     if (joints && !joints->is(Kind::list)) {
-      for (const Entry& entry : joints->entries("[joint, ...] or {joint: {stiffness, damping, target, max_force}}")) {
+      constexpr std::string_view kExpected =
+          "[joint, ...] or {joint: {stiffness, damping, target, target_velocity, feedforward, max_force}}";
+      for (const Entry& entry : joints->entries(kExpected)) {
         entry.value.entries_of(kServoJoint);
         const NamedJoint named = screw(entry);
         if (!entry.value.find("stiffness")) require_stiffness(entry.value);
@@ -273,8 +309,10 @@ class Reader {
         own_values(entry.value, servos.at(named.row));
       }
     }
-    if (const auto targets = at.find("targets")) {
-      for (const Entry& entry : targets->entries("{joint: number}")) {
+    const auto over_joints = [&](const char* key, const char* own_key, const auto& put) {
+      const auto map = at.find(key);
+      if (!map) return;
+      for (const Entry& entry : map->entries("{joint: number, FILE.csv or {times, values}}")) {
         const NamedJoint named = screw(entry);
         refuse_follower(entry.value, named);
         const auto found = servos.find(named.row);
@@ -282,15 +320,18 @@ class Reader {
           entry.value.fail(fmt::format("joint {} has no servo", linden::quoted(entry.key)), "a joint that has one",
                            "add it to joints");
         if (joints && joints->is(Kind::map)) {
-          if (const auto own = joints->find(entry.key); own && own->find("target"))
-            entry.value.refuse("one target a joint", "leave one out");
+          if (const auto own = joints->find(entry.key); own && own->find(own_key))
+            entry.value.refuse(fmt::format("one {} a joint", own_key), "leave one out");
         }
-        found->second.target = entry.value.number();
+        put(found->second, course(entry.value));
       }
-    }
+    };
+    over_joints("targets", "target", set_target);
+    over_joints("velocities", "target_velocity", [](Servo& servo, Course course) { servo.target_velocity = std::move(course); });
+    over_joints("feedforward", "feedforward", [](Servo& servo, Course course) { servo.feedforward = std::move(course); });
     std::vector<std::string> dead;
     for (const auto& [row, servo] : servos) {
-      if (servo.stiffness == 0 && servo.damping == 0) continue;
+      if (servo.stiffness == 0 && servo.damping == 0 && is_zero(servo.feedforward)) continue;
       if (servo.max_force == 0) dead.push_back(model_.names.velocity[static_cast<std::size_t>(row)]);
       result_.effects.servos.push_back(servo);
     }
@@ -301,10 +342,25 @@ class Reader {
     }
   }
 
+  static bool is_zero(const Course& course) {
+    return std::ranges::all_of(course.values, [](double value) { return value == 0; });
+  }
+
+  /// A table, or where it is one value, that.
+  static void set_target(Servo& servo, Course course) {
+    if (course.values.size() == 1) {
+      servo.target = course.values.front();
+    } else {
+      servo.target_over_time = std::move(course);
+    }
+  }
+
   void own_values(const SceneValue& at, Servo& servo) const {
     if (const auto value = at.find("stiffness")) servo.stiffness = value->not_negative();
     if (const auto value = at.find("damping")) servo.damping = value->not_negative();
-    if (const auto value = at.find("target")) servo.target = value->number();
+    if (const auto value = at.find("target")) set_target(servo, course(*value));
+    if (const auto value = at.find("target_velocity")) servo.target_velocity = course(*value);
+    if (const auto value = at.find("feedforward")) servo.feedforward = course(*value);
     if (const auto value = at.find("max_force")) servo.max_force = max_force(value, servo.row);
   }
 
@@ -321,7 +377,7 @@ class Reader {
     if (at.is(Kind::text)) {
       const std::string& word = at.text("a number or FILE.csv");
       const std::optional<double> value = number_in(word);
-      if (value) return {{0}, {*value}};
+      if (value) return {{0}, {at.number()}};
       if (!word.ends_with(".csv")) at.refuse("a number, FILE.csv or {times, values}", "write for example 0.5");
       return course_of_file(at);
     }

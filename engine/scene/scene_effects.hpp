@@ -6,19 +6,21 @@
 //   damping    urdf | number (every screw and ball joint) | {joint: number}
 //   friction   urdf | number (every screw joint) | {joint: number}
 //   spring     {joint: {stiffness, rest: number, or of a ball joint quaternion}}
-//   limits     urdf | {restitution} (all of the URDF's) | {joint: urdf | {lower, upper, restitution}}
-//   servo      {stiffness, damping, max_force: urdf | none | number, targets: {joint: number},
-//               joints: [joint, ...] | {joint: {stiffness, damping, target, max_force}}}
-//   torque     {joint: number | FILE.csv | {times, values}}
+//   limits     urdf | {restitution, velocity: urdf | number} (all of the URDF's; a number on every screw joint)
+//               | {joint: urdf | {lower, upper, restitution, velocity}}
+//   servo      {stiffness, damping, max_force: urdf | none | number, targets, velocities, feedforward: {joint: over time},
+//               joints: [joint, ...] | {joint: {stiffness, damping, target, target_velocity, feedforward, max_force}}}
+//   torque     {joint: over time};  over time: number | FILE.csv | {times, values}
 //   wrench     {link: {force, moment, point, frame: world | body, from, to, file}, or a list of such}
 //   drag       {linear, quadratic, wind, bodies: {link: {linear, quadratic}}}
 //   ground     {normal, height, stiffness, damping, friction, terrain: {file, spacing, origin}}
 //
 // A servo acts on every screw joint; on those that `joints` names where it is a list, or a map without a `stiffness` beside it. Targets
-// are the positions at the start where none are given.
+// are the positions at the start where none are given; a target that moves has no velocity but the one given for it. Limits of velocity
+// are none but those that are named: `limits: urdf` means positions.
 // Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo and torque refuse it.
 // Free joints have none of these, ball joints damping and spring only. A link that is merged into another's body acts there.
-// CSV files are found relative to the scene: time,value a line for torque and wrench (there a share of force and moment).
+// CSV files are found relative to the scene: time,value a line for torque, servo and wrench (there a share of force and moment).
 #pragma once
 
 #include <array>

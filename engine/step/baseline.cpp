@@ -100,7 +100,8 @@ void Baseline::drive(double time, const Field<double>& v) {
   const Effects& effects = plan_.effects;
   for (const JointDamping& damper : effects.damping) work_.force(damper.row) -= damper.coefficient * v(damper.row);
   for (const Servo& servo : effects.servos) {
-    work_.force(servo.row) += servo.stiffness * (servo.target - q_(plan_.q_row(servo.row))) - servo.damping * v(servo.row);
+    work_.force(servo.row) += servo.stiffness * (servo.target_at(time) - q_(plan_.q_row(servo.row))) +
+                              servo.damping * (servo.target_velocity.at(time) - v(servo.row)) + servo.feedforward.at(time);
   }
   for (const JointTorque& torque : effects.torques) work_.force(torque.row) += torque.force.at(time);
 }
@@ -113,7 +114,8 @@ void Baseline::push_bodies(double time) {
     store(work_.impulse, slot, load<Wrench, double>(work_.impulse, slot) - wrench);
   };
   for (const BodyWrench& wrench : plan_.effects.wrenches) {
-    Vec3<double> force = share_at(wrench, time) * vector(wrench.force), moment = share_at(wrench, time) * vector(wrench.moment);
+    const double share = wrench.share_at(time);
+    Vec3<double> force = share * vector(wrench.force), moment = share * vector(wrench.moment);
     if (wrench.in_world) {
       const auto R = load<Placement, double>(pose_, wrench.slot).R;
       force = transpose_times(R, force);

@@ -54,7 +54,7 @@ struct Block {
   Real* pace;                 // [2]  see State
   const Real* applied;        // [nv] forces given from outside; null: none
   const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
-  const Real* targets;        // [servos] targets of each instance; null: the plan's
+  const Real* targets;        // [servos] targets of each instance, NaN: of the plan's table; null: the plan's
   const Real* frictions;      // [frictions] forces of each instance; null: the plan's
   Real* contacts;             // [points] how each contact point ended the last step (EffectSweeps::contact); null: none
   InstanceRecord* instances;  // [W]

@@ -59,10 +59,6 @@ std::vector<GroundPoint> points_of(const Contacts& contacts) {
 
 }  // namespace
 
-double share_at(const BodyWrench& wrench, double time) {
-  return time >= wrench.from && time < wrench.to ? wrench.scale.at(time) : 0;
-}
-
 EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
   check(effects, model);
   const double h = options.step;
@@ -86,6 +82,15 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
   });
   revises = !effects.friction.empty() || !effects.limits.empty() || !points.empty() ||
             std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
+
+  const auto moves = [](const Course& course) { return std::ranges::any_of(course.values, [](double value) { return value != 0; }); };
+  servos_move = std::ranges::any_of(effects.servos, [&](const Servo& servo) {
+    return servo.target_moves() || moves(servo.target_velocity) || moves(servo.feedforward);
+  });
+  if (std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return std::isfinite(limit.velocity); })) {
+    fastest.allocate(tree.shape.velocities, std::numeric_limits<double>::infinity());
+    for (const JointLimit& limit : effects.limits) fastest(limit.row) = limit.velocity;
+  }
 
   if (joints) {
     q_row.allocate(tree.shape.velocities, -1);

@@ -24,9 +24,6 @@ struct TouchedBody {
   Entries drag, wrenches, points;
 };
 
-/// What of a wrench acts at a time.
-double share_at(const BodyWrench& wrench, double time);
-
 struct EffectPlan {
   /// Throws InputError for effects that make no sense for the model.
   EffectPlan(const Model& model, const Options& options, const Effects& effects);
@@ -36,11 +33,13 @@ struct EffectPlan {
   bool bodies = false;   // on bodies
   bool springs = false;  // some potential beside gravity's
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
+  bool servos_move = false;  // some servo has a table
   bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
   bool any() const { return joints || bodies; }
 
   Field<Index> q_row;               // position row of a screw's velocity row
   std::vector<double> damping_share, servo_share, drag_share;
+  Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
   GroundPlan ground;                // no points without ground
   std::vector<TouchedBody> touched;  // sorted by slot

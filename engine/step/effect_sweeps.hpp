@@ -1,7 +1,7 @@
 // engine/step/effect_sweeps.hpp
 // The effects of a scene within a step: what they keep while it is solved, and when their kernels are called.
 //
-//   begin            tables at the middle of the step's time; states (sticks? at its limit?) as the first guess suggests
+//   begin            means of tables over the step; states (sticks? at its limit?) as the first guess suggests
 //   +-> bodies       forces on bodies, after their momenta are known                 once an evaluation
 //   |   joints       impulses of joints into the target of the residual              once an evaluation
 //   |   revise       states that belong to the solution so far: did one change?      where some effect has states
@@ -35,16 +35,25 @@
 
 namespace linden {
 
-/// f of each number of a Scalar.
+/// Numbers in a Scalar.
+template <class S>
+inline constexpr std::size_t kLanesOf = sizeof(S) / sizeof(typename ElementOf<S>::type);
+
+/// When a step begins, in each lane [s]: in double precision whatever that of the lanes is, or tables would be looked up beside it.
+template <class S>
+using LaneTimes = std::array<double, kLanesOf<S>>;
+
+/// f of each lane's time.
 template <class S, class Function>
-LINDEN_INLINE S in_each_lane(const S& x, const Function& f) {
+LINDEN_INLINE S at_each_time(const LaneTimes<S>& times, const Function& f) {
   if constexpr (std::is_arithmetic_v<S>) {
-    return static_cast<S>(f(static_cast<double>(x)));
+    return static_cast<S>(f(times[0]));
   } else {
     using Real = typename ElementOf<S>::type;
-    std::array<Real, sizeof(S) / sizeof(Real)> each;
-    x.store_unaligned(each.data());
-    for (Real& number : each) number = static_cast<Real>(f(static_cast<double>(number)));
+    std::array<Real, kLanesOf<S>> each;
+    for (std::size_t l = 0; l < each.size(); ++l) {
+      each[l] = l > 0 && times[l] == times[l - 1] ? each[l - 1] : static_cast<Real>(f(times[l]));
+    }
     return S::load_unaligned(each.data());
   }
 }
@@ -63,8 +72,13 @@ class EffectSweeps {
       servos_.entries = effects.servos;
       servos_.share = plan.servo_share;
       rows(servos_.mode, effects.servos.size());
+      rows(servos_.lead, effects.servos.size());
       rows(servos_.target, effects.servos.size());
-      for (std::size_t k = 0; k < effects.servos.size(); ++k) servos_.target(static_cast<Index>(k)) = as<S>(effects.servos[k].target);
+      rows(set_targets_, effects.servos.size());
+      for (std::size_t k = 0; k < effects.servos.size(); ++k) {
+        const Servo& servo = effects.servos[k];
+        set_targets_(static_cast<Index>(k)) = as<S>(servo.target_moves() ? std::numeric_limits<double>::quiet_NaN() : servo.target);
+      }
       frictions_.entries = effects.friction;
       rows(frictions_.mode, effects.friction.size());
       rows(frictions_.force, effects.friction.size());
@@ -116,7 +130,8 @@ class EffectSweeps {
   Index contacts() const { return points_.slides.rows(); }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
-  Field<S>& servo_targets() { return servos_.target; }
+  /// To be written between steps; not a number: the target is that of the servo's table.
+  Field<S>& servo_targets() { return set_targets_; }
   Field<S>& friction_forces() { return frictions_.force; }
 
   /// After placements changed. Returns the potential energy of springs and of the ground at q [J].
@@ -132,22 +147,26 @@ class EffectSweeps {
     return potential;
   }
 
-  /// delta: the first guess, moved into the limits. past(row, k): displacement k steps before, where two are `known`.
+  /// A step from `times` on. delta: the first guess, moved into the limits. past(row, k): displacement k steps before, where two are
+  /// `known`.
   template <class Past, class Mask>
-  void begin(const S& time, const S& h, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
+  void begin(const LaneTimes<S>& times, double step, const Field<S>& q, const Past& past, const Mask& known, Field<S>& delta) {
+    const S h = as<S>(step);
     h_ = h;
     q_ = &q;
     creep_ = 0;
     ground_before_ = ground_potential_;
     for (Index k = 0; k < wrenches_.scale.rows(); ++k) {
       const BodyWrench& wrench = plan_.effects.wrenches[static_cast<std::size_t>(k)];
-      wrenches_.scale(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return share_at(wrench, t); });
+      wrenches_.scale(k) = at_each_time<S>(times, [&](double t) LINDEN_INLINE_LAMBDA { return wrench.mean_share(t, t + step); });
     }
     if (!plan_.joints) return;
     for (Index k = 0; k < force_.rows(); ++k) {
       const JointTorque& torque = plan_.effects.torques[static_cast<std::size_t>(k)];
-      force_(k) = in_each_lane(time, [&](double t) LINDEN_INLINE_LAMBDA { return torque.force.at(t); });
+      force_(k) = at_each_time<S>(times, [&](double t) LINDEN_INLINE_LAMBDA { return torque.force.mean(t, t + step); });
     }
+    std::ranges::copy(set_targets_.flat(), servos_.target.flat().begin());
+    if (plan_.servos_move) begin_servo_tables(times, step);
     std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
     begin_friction(frictions_, past, known, delta);
     begin_limits(limits_, plan_.q_row, h, q, past, known, delta);
@@ -249,6 +268,7 @@ class EffectSweeps {
 
   /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
   void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) {
+    using std::abs;
     const S half(0.5), rate = S(1.0) / h_;
     joint_impulses_end_map(sum_, h_, delta, end);
     if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
@@ -257,8 +277,10 @@ class EffectSweeps {
       S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
       if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
       const auto held = sum_.stiffness(row) > most;
-      // the step that comes to rest is an impact
-      uneven = select(held, select(delta(row) == zero, uneven + half * residual(row), zero), uneven);
+      // the step that comes to rest is an impact; what keeps it there, or at its limit of velocity, lasts
+      auto lasts = delta(row) == zero;
+      if (plan_.fastest.rows() > 0) lasts = lasts || abs(delta(row)) == h_ * as<S>(plan_.fastest(row));
+      uneven = select(held, select(lasts, uneven + half * residual(row), zero), uneven);
       residual(row) = select(held, zero, residual(row));
       uneven = rate * uneven;
       even_(row) = lasting(uneven, last_(row));
@@ -363,6 +385,21 @@ class EffectSweeps {
   S ground_stored() const { return ground_potential_ - ground_before_; }
 
  private:
+  void begin_servo_tables(const LaneTimes<S>& times, double step) {
+    for (Index k = 0; k < servos_.mode.rows(); ++k) {
+      const Servo& servo = plan_.effects.servos[static_cast<std::size_t>(k)];
+      servos_.lead(k) = at_each_time<S>(times, [&](double t) LINDEN_INLINE_LAMBDA {
+        return servo.damping * servo.target_velocity.mean(t, t + step) + servo.feedforward.mean(t, t + step);
+      });
+      if (!servo.target_moves()) continue;
+      const double gone = 2 * servos_.share[static_cast<std::size_t>(k)] - 1;
+      const S moving = at_each_time<S>(
+          times, [&](double t) LINDEN_INLINE_LAMBDA { return servo.target_over_time.mean(t + gone * step, t + step); });
+      const S& given = set_targets_(k);
+      servos_.target(k) = select(given == given, given, moving);
+    }
+  }
+
   /// sum_ from all effects in their states.
   void assemble() {
     clear(sum_);
@@ -390,6 +427,7 @@ class EffectSweeps {
   Field<S> rotors_;  // armature of every row; no rows without
   JointImpulses<S> sum_;
   Servos<S> servos_;
+  Field<S> set_targets_;  // of each servo, from outside; not a number where its table says
   Frictions<S> frictions_;
   Limits<S> limits_;
   Field<S> force_;  // of each given torque

@@ -52,10 +52,10 @@ class LaneEffects {
   /// After the first guess. Lanes are each at their own time.
   void begin(const Block<Real>& block, double h, const Field<Pack>& q, Workspace<Pack>& work) {
     if (sweeps_.plan().joints) std::ranges::copy(work.momentum_target.flat(), sweeps_.plain_target().flat().begin());
-    std::array<Real, W> time{};
+    LaneTimes<Pack> time{};
     Lanes known = 0;
     for (int l = 0; l < block.count; ++l) {
-      time[static_cast<std::size_t>(l)] = static_cast<Real>((static_cast<double>(block.instances[l].steps) + 0.5) * h);
+      time[static_cast<std::size_t>(l)] = static_cast<double>(block.instances[l].steps) * h;
       known |= block.instances[l].displacements > 1 ? 1u << l : 0u;
     }
     constexpr int words = kHistoryWords<Real> * W;
@@ -65,7 +65,7 @@ class LaneEffects {
       for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<W, Real>(from + l, steps);
       return L::load(each.data());
     };
-    sweeps_.begin(L::load(time.data()), Pack(static_cast<Real>(h)), q, past, L::mask(known), work.delta);
+    sweeps_.begin(time, h, q, past, L::mask(known), work.delta);
   }
 
   /// What effects do to an evaluation, its exact factor, and its norm.

@@ -45,7 +45,8 @@ class Stepper {
   /// Of effects, in the step taken last.
   virtual const EffectWork<double>& effect_work() const = 0;
 
-  /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; empty without servos.
+  /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; NaN: that of the servo's table. Empty
+  /// without servos.
   virtual std::span<double> servo_targets() = 0;
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
   virtual std::span<double> friction_forces() = 0;

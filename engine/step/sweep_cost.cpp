@@ -100,7 +100,7 @@ class Bench {
       auto& effects = sweeps_.effects();
       if (effects.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects.plain_target().flat().begin());
       const auto past = [&](Index row, int steps) { return state_.history(row, steps - 1); };
-      effects.begin(0.0, options_.step, state_.q, past, history_ >= 2, work_.delta);
+      effects.begin({0.0}, options_.step, state_.q, past, history_ >= 2, work_.delta);
       sweeps_.begin(history_ > 0, 0);
     }
     sweeps_.evaluate(true, report);

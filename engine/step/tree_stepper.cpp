@@ -115,7 +115,7 @@ void TreeStepper<kEffects>::begin_effects(const State<double>& state, int histor
 {
   if (effects_.plan().joints) std::ranges::copy(work_.momentum_target.flat(), effects_.plain_target().flat().begin());
   const auto past = [&](Index row, int steps) { return state.history(row, steps - 1); };
-  effects_.begin(time_ + 0.5 * h, h, state.q, past, history >= 2, work_.delta);
+  effects_.begin({time_}, h, state.q, past, history >= 2, work_.delta);
   if (history > 0) {
     for (Index row = 0; row < before_.rows(); ++row) before_(row) = state.history(row, 0);
   } else {

@@ -5,6 +5,7 @@
 //   closed  (mode = 1, -1)  delta = highest or lowest exactly, as long as the limit has to push
 //
 //   highest = max(upper - q^k, 0)     or, after an impact with restitution e:  -e delta_in, delta_in the step before it
+//   -h v <= lowest, highest <= h v    with a limit v of velocity
 //
 // No penalty: a closed joint is taken out of the solve, as one that friction holds. A joint never passes its limit by more than the
 // solver's rounding; one that starts beyond it may come back but go no further. The step that meets the limit ends on it; the one
@@ -32,6 +33,16 @@ struct Limits {
 /// Impacts slower than this many times h^2 do not bounce, or a joint at rest on its limit would hum [rad/s^2, m/s^2].
 inline constexpr double kStillAcceleration = 50;
 
+/// What is left of that room at no more than the limit of velocity, either way.
+template <class S>
+LINDEN_INLINE void narrow_by_velocity(const JointLimit& limit, const S& h, S& lowest, S& highest) {
+  using std::max;
+  using std::min;
+  const S reach = h * as<S>(limit.velocity);
+  highest = max(min(highest, reach), -reach);
+  lowest = min(max(lowest, -reach), reach);
+}
+
 /// Room for the displacement, and the modes that its first guess suggests, moved into the limits. past(row, k): displacement k steps
 /// before, where two are `known`.
 template <class S, class Past, class Mask>
@@ -51,6 +62,7 @@ void begin_limits(Limits<S>& limits, const Field<Index>& q_row, const S& h, cons
       highest = select(known && up < slack && rise > slow, as<S>(-limit.restitution) * rise, highest);
       lowest = select(known && down > -slack && fall < -slow, as<S>(-limit.restitution) * fall, lowest);
     }
+    narrow_by_velocity(limit, h, lowest, highest);
     limits.highest(k) = highest;
     limits.lowest(k) = lowest;
     S& d = delta(limit.row);

@@ -1,10 +1,15 @@
 // kernels/effects/servo.hpp
 // Position servos with limited force: PD control, implicit in both gains.
 //
-//   force  clamp(k (target - q) - c qdot, -most, most),  q taken at q^k + s delta, qdot = delta / h
+//   force  clamp(k (target - q) - c qdot + lead, -most, most),  q taken at q^k + s delta, qdot = delta / h
+//   lead   c target_velocity + feedforward
 //
-//   within its limit   o = h^2 k (q^k - target),  g = h^2 k s + h c,  share s by g / d (joint_impulses.hpp)
+//   within its limit   o = h^2 (k (q^k - target) - lead),  g = h^2 k s + h c,  share s by g / d (joint_impulses.hpp)
 //   at its limit       o = -+ h^2 most,  g = 0,  share s
+//
+// Of what goes over time lead is the mean over the step: delta / h is one too, and a feed-forward impulse comes whole. The target is that
+// of the time q is taken at, t + s h, as the mean of [t + (2 s - 1) h, t + h]: of the whole step where s = 1/2, of its end where the servo
+// holds the joint fast, and never of what is yet to come.
 //
 // Which of the two holds is settled within the solve: `mode` is 0, 1 or -1 (at the limit, pushing up or down) and is revised until it is
 // that of the solution.
@@ -27,6 +32,7 @@ struct Servos {
   std::span<const double> share;  // s of each
   Field<S> target;                // of each [rad, m]
   Field<S> mode;                  // of each
+  Field<S> lead;                  // of each [N m, N]
 };
 
 /// o and g as if there were no limit, and the limit of |o + g delta|.
@@ -39,7 +45,7 @@ template <class S>
 LINDEN_INLINE ServoLaw<S> servo_law(const Servos<S>& servos, Index k, const Field<Index>& q_row, const S& h, const Field<S>& q) {
   const Servo& servo = servos.entries[static_cast<std::size_t>(k)];
   const S stiff = h * h * as<S>(servo.stiffness);
-  return {stiff * (q(q_row(servo.row)) - servos.target(k)),
+  return {stiff * (q(q_row(servo.row)) - servos.target(k)) - h * h * servos.lead(k),
           as<S>(servos.share[static_cast<std::size_t>(k)]) * stiff + h * as<S>(servo.damping), h * h * as<S>(servo.max_force)};
 }
 

@@ -1,7 +1,10 @@
 // kernels/effects/torque.hpp
 // Forces on joints that are given over time.
 //
-//   force tau(t), taken at the middle of the step:    o = -h^2 tau,  g = 0,  share 1/2
+//   force tau(t), its mean over the step:    o = -h^2 tau,  g = 0,  share 1/2
+//
+// so that the impulse is that of the table whatever the step. Its halves meet the velocities before and after them: what the two give is
+// tau delta, of one step that is pushed alone too.
 //
 // units   [N m, N]
 // energy  gives tau delta a step
@@ -15,7 +18,7 @@
 
 namespace linden {
 
-/// force: one number an entry, of the middle of the step.
+/// force: one number an entry, its mean over the step.
 template <class S>
 void torque_map(std::span<const JointTorque> torques, const Field<S>& force, const S& h, JointImpulses<S>& sum) {
   for (Index k = 0; k < force.rows(); ++k) {

@@ -4,7 +4,7 @@
 //   in the world's frame   the same direction at both ends of the step
 //   in the body's frame    turns with the body
 //
-// at the middle of the step's time, share 1/2. F acts at the body's point a.
+// by the mean over the step of what acts, share 1/2. F acts at the body's point a.
 //
 // units   [N], [N m]
 // energy  gives F.D + moment . turn a step

@@ -231,6 +231,72 @@ TEST_CASE("limits come from the file, bounce, or are given by name", "[scene]") 
   CHECK(half.limits[0].upper == std::numeric_limits<double>::infinity());
 }
 
+TEST_CASE("limits of velocity come from the file, for all or by name", "[scene]") {
+  const double none = std::numeric_limits<double>::infinity();
+  const Model arm = load_urdf(std::string(LINDEN_MODELS_DIR) + "/arm.urdf");
+  for (const JointLimit& entry : effects(kArm, "  limits: urdf\n").limits) CHECK(entry.velocity == none);
+  const Effects all = effects(kArm, "  limits: {velocity: urdf, restitution: 0.4}\n");
+  REQUIRE(all.limits.size() == 7);
+  for (const JointLimit& entry : all.limits) {
+    CHECK(std::isfinite(entry.velocity));
+    CHECK(entry.velocity == arm.attributes.max_velocity(entry.row));
+    CHECK(entry.lower == arm.attributes.lower(entry.row));
+    CHECK(entry.restitution == 0.4);
+  }
+  const Effects same = effects(kArm, "  limits: {velocity: 0.25, restitution: 0.4}\n");
+  REQUIRE(same.limits.size() == 7);
+  for (const JointLimit& entry : same.limits) {
+    CHECK(entry.velocity == 0.25);
+    CHECK(entry.upper == arm.attributes.upper(entry.row));
+    CHECK(entry.restitution == 0.4);
+  }
+  const Effects named = effects(kArm,
+                                "  limits:\n    velocity: 3\n    joint_1: urdf\n    joint_2: {velocity: urdf}\n    joint_3: {lower: 0}\n"
+                                "    joint_4: {velocity: 0.5, upper: 2}\n");
+  REQUIRE(named.limits.size() == 4);
+  CHECK(named.limits[0].velocity == 3);
+  CHECK(named.limits[1].velocity == arm.attributes.max_velocity(1));
+  CHECK(named.limits[2].velocity == 3);
+  CHECK(named.limits[3].velocity == 0.5);
+  CHECK(named.limits[3].upper == 2);
+  // a joint without any in its file
+  const Effects chained = effects("model: chain:3\n", "  limits: {joint2: {velocity: 2}}\n");
+  REQUIRE(chained.limits.size() == 1);
+  CHECK(chained.limits[0].lower == -none);
+  CHECK(effects("model: chain:3\n", "  limits: {velocity: 2}\n").limits.size() == 3);
+}
+
+TEST_CASE("servos take targets, their velocities and feed-forward forces over time", "[scene]") {
+  const Folder folder;
+  folder.write("way.csv", "time,angle\n0,0.5\n1,0.75\n2.5,-1\n");
+  folder.write("scene.yaml", "model: " LINDEN_MODELS_DIR
+                             "/arm.urdf\neffects:\n  servo:\n    stiffness: 200\n    damping: 20\n"
+                             "    targets: {joint_1: way.csv, joint_2: {times: [0, 1], values: [0, 3]}, joint_3: 0.5}\n"
+                             "    velocities: {joint_2: 3, joint_4: {times: [0, 1, 1], values: [0, 1, 0]}}\n"
+                             "    feedforward: {joint_1: way.csv, joint_5: -2}\n"
+                             "    joints:\n      joint_6:\n        target: way.csv\n        target_velocity: 1\n"
+                             "        feedforward: {times: [1, 2], values: [3, 4]}\n");
+  const std::vector<Servo> servos = load_scene(folder.file("scene.yaml")).effects.servos;
+  REQUIRE(servos.size() == 7);
+  CHECK(servos[0].target_over_time.times == std::vector<double>{0, 1, 2.5});
+  CHECK(servos[0].target_over_time.values == std::vector<double>{0.5, 0.75, -1});
+  CHECK(servos[0].feedforward.values == std::vector<double>{0.5, 0.75, -1});
+  CHECK(servos[1].target_at(0.5) == 1.5);
+  CHECK(servos[1].target_velocity.at(7) == 3);
+  CHECK_FALSE(servos[2].target_moves());
+  CHECK(servos[2].target == 0.5);
+  CHECK(servos[2].target_velocity.at(1) == 0);
+  CHECK(servos[3].target_velocity.values == std::vector<double>{0, 1, 0});
+  CHECK(servos[4].feedforward.at(0) == -2);
+  CHECK(servos[5].target_at(1) == 0.75);
+  CHECK(servos[5].target_velocity.at(0) == 1);
+  CHECK(servos[5].feedforward.at(1.5) == 3.5);
+  // a force alone is enough
+  const Effects pushed = effects(kArm, "  servo: {joints: {joint_1: {stiffness: 0, feedforward: 2}, joint_2: {stiffness: 0}}}\n");
+  REQUIRE(pushed.servos.size() == 1);
+  CHECK(pushed.servos[0].feedforward.at(0) == 2);
+}
+
 TEST_CASE("servos hold the start, as strong as the motors are", "[scene]") {
   const Model arm = load_urdf(LINDEN_MODELS_DIR "/arm.urdf");
   const std::string start = kArm + "initial: {positions: {joint_2: 0.7, joint_5: -0.3}}\n";
@@ -555,13 +621,26 @@ TEST_CASE("values that make no sense are refused where they stand", "[scene]") {
   refused("effects: {limits: {restitution: 2}}\n", {"from 0 to 1"});
   refused("effects: {limits: {joint1: {lower: 1, upper: 0}}}\n", {"goes from 1 to 0"});
   refused("effects: {limits: {joint1: urdf}}\n", {"has no limit"});
-  refused("effects: {limits: yes}\n", {"urdf, {restitution: number}"});
+  refused("effects: {limits: yes}\n", {"urdf, {restitution: number, velocity: urdf or number}"});
   refused("effects: {servo: {damping: 1}}\n", {"has no stiffness"});
   refused("effects: {servo: {joints: {joint1: {damping: 1}}}}\n", {"effects.servo.joints.joint1 has no stiffness"});
   refused("effects: {servo: {stiffness: 1, joints: [joint1, joint1]}}\n", {"every joint once"});
   refused("effects: {servo: {stiffness: 1, joints: [joint1], targets: {joint2: 1}}}\n", {"\"joint2\" has no servo"});
   refused("effects: {servo: {stiffness: 1, joints: {joint1: {target: 1}}, targets: {joint1: 1}}}\n", {"one target a joint"});
   refused("effects: {servo: {stiffness: 1, max_force: lots}}\n", {"urdf, none or a number"});
+  refused("effects: {servo: {stiffness: 1, targets: {joint1: soon}}}\n", {"effects.servo.targets.joint1 is \"soon\"", "FILE.csv"});
+  refused("effects: {servo: {stiffness: 1, targets: {joint1: none.csv}}}\n", {"none.csv"});
+  refused("effects: {servo: {stiffness: 1, velocities: {joint1: {times: [1, 0], values: [1, 2]}}}}\n", {"time 0 s comes after 1 s"});
+  refused("effects: {servo: {stiffness: 1, feedforward: {joint1: {times: [1]}}}}\n", {"effects.servo.feedforward.joint1 has no values"});
+  refused("effects: {servo: {stiffness: 1, feed_forward: {joint1: 1}}}\n", {"did you mean feedforward?"});
+  refused("effects: {servo: {stiffness: 1, joints: {joint1: {target_velocty: 1}}}}\n", {"did you mean target_velocity?"});
+  refused("effects: {servo: {stiffness: 1, joints: {joint1: {target_velocity: 1}}, velocities: {joint1: 1}}}\n",
+          {"one target_velocity a joint"});
+  refused("effects: {servo: {stiffness: 1, joints: [joint1], feedforward: {joint2: 1}}}\n", {"\"joint2\" has no servo"});
+  refused("effects: {limits: {velocity: -1}}\n", {"effects.limits.velocity is \"-1\"; expected zero or more"});
+  refused("effects: {limits: {velocity: fast}}\n", {"urdf or a number"});
+  refused("effects: {limits: {joint1: {velocity: urdf}}}\n", {"the model's file limits no velocity of \"joint1\""});
+  refused("effects: {limits: {joint1: {velocty: 1}}}\n", {"did you mean velocity?"});
   refused("effects: {servo: {stiffness: -1}}\n", {"zero or more"});
   refused("effects: {torque: {joint1: much}}\n", {"a number, FILE.csv or {times, values}"});
   refused("effects: {torque: {joint1: none.csv}}\n", {"none.csv: there is no such file"});
@@ -705,6 +784,7 @@ TEST_CASE("what is named and does nothing is said", "[scene]") {
   warned("spring: {}", "no joint has any");
   warned("drag: {wind: [1, 0, 0]}", "no body has any");
   warned("ground: {}", "nothing touches it");
+  warned("limits: {velocity: 0}", "3 of 3 joints cannot move");
   warned("servo: {stiffness: 5, max_force: 0}", "3 of 3 servos have no strength");
   CHECK(scene("model: chain:3\neffects:\n  damping: 1\n").model.warnings.empty());
 }
@@ -803,7 +883,7 @@ TEST_CASE("the program runs and inspects scenes", "[scene][command line]") {
   CHECK(run.exit_code == 0);
   CHECK(run.err.empty());
   CHECK_THAT(run.out, Contains("arm (a.yaml)") && Contains("damping: 7 joints, 0.5 to 5 N m s/rad") && Contains("10 steps"));
-  CHECK_THAT(run.out, Contains("ignored     friction of 7;") && Contains("as the scene says"));
+  CHECK_THAT(run.out, Contains("ignored     friction of 7, velocity limits of 7;") && Contains("as the scene says"));
   const auto figures = nlohmann::json::parse(text_of(shell / "run.json"));
   CHECK(figures.at("ignored").at("limits") == 0);
   CHECK(figures.at("ignored").at("friction") == 7);

@@ -80,10 +80,11 @@ void check_force(const Effect& effect, double share, const std::function<double(
 
 const double kShares[] = {0.5, 0.7, 1.0};
 
-Servos<double> one_servo(const std::vector<Servo>& entries, const std::vector<double>& share, double mode) {
-  Servos<double> servos{entries, share, {}, {}};
+Servos<double> one_servo(const std::vector<Servo>& entries, const std::vector<double>& share, double mode, double lead) {
+  Servos<double> servos{entries, share, {}, {}, {}};
   servos.target.allocate(1, entries[0].target);
   servos.mode.allocate(1, mode);
+  servos.lead.allocate(1, lead);
   return servos;
 }
 
@@ -124,10 +125,10 @@ TEST_CASE("each joint effect puts its force at both ends of a step, and its deri
         INFO("mode " << mode);
         check_force(
             [&](auto& row) {
-              const Servos<double> servos = one_servo(entries, shares, mode);
+              const Servos<double> servos = one_servo(entries, shares, mode, 3);
               servo_map(servos, row.q_row, kStep, row.q, row.sum);
             },
-            share, [&](double q, double rate) { return mode == 0 ? 50 * (-0.4 - q) - 2 * rate : mode * 11; });
+            share, [&](double q, double rate) { return mode == 0 ? 50 * (-0.4 - q) - 2 * rate + 3 : mode * 11; });
       }
     }
   }
@@ -245,6 +246,27 @@ TEST_CASE("a limit stops a joint where it is, and lets go of one that is pulled 
   CHECK(row.delta(kRow) == Approx(0.01).epsilon(1e-12));
 }
 
+TEST_CASE("a limit of velocity leaves a joint its reach within a step, and less where a limit of position is nearer") {
+  const double reach = 0.8 * kStep;
+  const auto past = [](Index, int) { return 1e-3; };
+  const auto room = [&](double lower, double upper) {
+    const std::vector<JointLimit> entries{{.row = kRow, .lower = kPosition + lower, .upper = kPosition + upper, .velocity = 0.8}};
+    Limits<double> limits{entries, {}, {}, {}};
+    for (Field<double>* field : {&limits.lowest, &limits.highest, &limits.mode}) field->allocate(1, std::nan(""));
+    JointRow<double> row(0.1);
+    begin_limits(limits, row.q_row, kStep, row.q, past, true, row.delta);
+    CHECK(limits.mode(0) == 1);
+    CHECK(row.delta(kRow) == limits.highest(0));
+    return std::pair(limits.lowest(0), limits.highest(0));
+  };
+  CHECK(room(-1, 1) == std::pair(-reach, reach));
+  CHECK(room(-1, 1e-4).first == -reach);
+  CHECK(room(-1, 1e-4).second == Approx(1e-4).epsilon(1e-9));
+  CHECK(room(-1e-4, 1).first == Approx(-1e-4).epsilon(1e-9));
+  CHECK(room(-1e-4, 1).second == reach);
+  CHECK(room(-1, -1).second == 0);  // beyond a limit it goes no further
+}
+
 TEST_CASE("a ball joint's spring pulls as its potential falls") {
   // along a displacement the work is the potential's loss, but for the third power of the turn
   const Model model = ball_chain(1);
@@ -317,10 +339,10 @@ TEST_CASE("joint effects treat all lanes alike and allocate nothing") {
   }
   const auto rig = []<class S>(S) {
     JointRow<S> row;
-    Servos<S> servos{kServos, kShare, {}, {}};
+    Servos<S> servos{kServos, kShare, {}, {}, {}};
     Frictions<S> frictions{kFrictions, {}, {}};
     Field<S> residual;
-    for (Field<S>* field : {&servos.target, &servos.mode, &frictions.force, &frictions.mode}) field->allocate(1);
+    for (Field<S>* field : {&servos.target, &servos.mode, &servos.lead, &frictions.force, &frictions.mode}) field->allocate(1);
     residual.allocate(2, S(0.0));
     return std::tuple(std::move(row), std::move(servos), std::move(frictions), std::move(residual));
   };
@@ -333,6 +355,7 @@ TEST_CASE("joint effects treat all lanes alike and allocate nothing") {
     row.q(kRow) = in[0];
     row.delta(kRow) = in[1];
     servos.target(0) = in[2];
+    servos.lead(0) = in[3];
     frictions.force(0) = in[3];
     residual(kRow) = in[4];
     servos.mode(0) = frictions.mode(0) = zero;

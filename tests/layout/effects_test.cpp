@@ -85,6 +85,61 @@ TEST_CASE("a course goes straight between its points and is held beyond them", "
   CHECK(Course().at(3) == 0);
 }
 
+TEST_CASE("a course's mean is its integral over the time, exactly", "[effects]") {
+  const Course course{{1, 2, 4, 4, 5}, {10, 20, 0, 7, 9}};
+  CHECK(course.mean(-3, 0.5) == 10);
+  CHECK(course.mean(6, 7) == 9);
+  CHECK(course.mean(1.2, 1.4) == Approx(13).epsilon(1e-14));       // one piece: the value at its middle
+  CHECK(course.mean(0, 6) == Approx((10 + 15 + 20 + 8 + 9) / 6.0).epsilon(1e-14));
+  CHECK(course.mean(3.5, 4.5) == Approx((0.5 * 2.5 + 0.5 * 7.5)).epsilon(1e-14));
+  CHECK(course.mean(3, 4) == Approx(5).epsilon(1e-14));            // the jump at its end is not in it
+  CHECK(course.mean(4, 5) == Approx(8).epsilon(1e-14));
+  CHECK(course.mean(1.999, 2.001) == Approx(20 - 0.0005 * 0.5 * (10 + 10)).epsilon(1e-14));
+  CHECK(course.mean(2, 2) == 20);
+  CHECK(Course().mean(0, 1) == 0);
+  CHECK(Course{{0}, {0.1}}.mean(0.3, 0.7) == 0.1);
+  // parts add up to the whole
+  double sum = 0;
+  for (int k = 0; k < 70; ++k) sum += 0.1 * course.mean(0.1 * k - 0.5, 0.1 * k - 0.4);
+  CHECK(sum == Approx(7 * course.mean(-0.5, 6.5)).epsilon(1e-13));
+  // points as close as times can be, and a jump that is not there for its neighbours
+  const Course spike{{0, 1, std::nextafter(1, 2), 2}, {0, 0, 1e3, 0}};
+  CHECK(spike.mean(0, 1) == Approx(0).margin(1e-9));
+  CHECK(spike.mean(0.5, 1.5) == Approx(0.5 * 750).epsilon(1e-12));
+}
+
+TEST_CASE("a wrench acts from its beginning to its end and not a rounding longer", "[effects]") {
+  BodyWrench wrench{.slot = 1};
+  CHECK(wrench.mean_share(3, 4) == 1);
+  wrench.from = 0.25;
+  wrench.to = 0.75;
+  CHECK(wrench.mean_share(0, 1) == 0.5);
+  CHECK(wrench.mean_share(0, 0.25) == 0);
+  CHECK(wrench.mean_share(0.5, 1) == 0.5);
+  CHECK(wrench.mean_share(0.75, 1) == 0);
+  wrench.scale = {{0.5, 0.5, 1}, {2, 4, 0}};
+  CHECK(wrench.mean_share(0, 1) == Approx(0.25 * 2 + 0.25 * 3).epsilon(1e-14));
+  wrench.scale = {{0}, {1}};
+  wrench.to = wrench.from;
+  CHECK(wrench.mean_share(0, 1) == 0);
+  // k times a step and the decimal that people write for it are one time
+  for (int k = 1; k < 20'000; ++k) {
+    for (const double step : {1e-3, 0.1, 7e-4}) {
+      const double at = step * k, before = step * (k - 1);
+      wrench.from = step == 1e-3 ? k / 1000.0 : step == 0.1 ? k / 10.0 : k * 7 / 10000.0;
+      wrench.to = 1e9;
+      if (wrench.mean_share(before, before + step) != 0 || wrench.mean_share(at, at + step) != 1) {
+        FAIL("from " << wrench.from << " s, step " << k << " of " << step << " s");
+      }
+      std::swap(wrench.from, wrench.to);
+      wrench.from = 0;
+      if (wrench.mean_share(before, before + step) != 1 || wrench.mean_share(at, at + step) != 0) {
+        FAIL("to " << wrench.to << " s, step " << k << " of " << step << " s");
+      }
+    }
+  }
+}
+
 TEST_CASE("rows and links are found by name, or with the nearest one", "[effects]") {
   for (Index i = 1; i < model().tree.shape.slots; ++i) {
     CHECK(row_of(model(), model().names.joint[static_cast<std::size_t>(i)]) == model().tree.first_v(i));
@@ -116,6 +171,26 @@ TEST_CASE("what a file says of mimic joints acts on their leader", "[effects]") 
   CHECK(limits[0].lower == -0.75);
   CHECK(limits[0].upper == 0.5);
   CHECK(limits[0].restitution == 0.25);
+  CHECK(limits[0].velocity == kInfinity);
+  CHECK(urdf_limits(model(), 0, true)[0].velocity == 5);
+  // |q'| <= 3, |2 q'| <= 4, |-0.5 q'| <= 2
+  const std::vector<JointLimit> speeds = on_leaders(model(), {{.row = row("leader_joint"), .velocity = 3},
+                                                              {.row = row("twice_joint"), .velocity = 4},
+                                                              {.row = row("back_joint"), .velocity = 2}});
+  REQUIRE(speeds.size() == 1);
+  CHECK(speeds[0].velocity == 2);
+  CHECK(on_leaders(model(), {JointLimit{.row = row("back_joint"), .velocity = 2}})[0].velocity == 4);
+}
+
+TEST_CASE("a file's limits of velocity are of joints that have no others too", "[effects]") {
+  LinkSpec wheel = link_called("wheel", "", JointType::revolute);
+  wheel.limits.velocity = 9;
+  const Model cart = TreeBuilder("cart").add(wheel).add(link_called("free", "wheel", JointType::revolute)).build();
+  CHECK(urdf_limits(cart).empty());
+  const std::vector<JointLimit> limits = urdf_limits(cart, 0.5, true);
+  REQUIRE(limits.size() == 1);
+  CHECK(limits[0].row == 0);
+  CHECK((limits[0].lower == -kInfinity && limits[0].upper == kInfinity && limits[0].velocity == 9));
 }
 
 TEST_CASE("what is given everywhere reaches every joint once", "[effects]") {
@@ -124,6 +199,9 @@ TEST_CASE("what is given everywhere reaches every joint once", "[effects]") {
   for (const Armature& entry : armature) CHECK(entry.inertia == (entry.row == row("leader_joint") ? 2 * (1 + 4 + 0.25) : 2));
   CHECK(damping_everywhere(model(), 1).size() == 7);
   CHECK(friction_everywhere(model(), 1).size() == 4);
+  const std::vector<JointLimit> speeds = velocity_limit_everywhere(model(), 3);
+  CHECK(speeds.size() == 4);
+  for (const JointLimit& entry : speeds) CHECK(entry.velocity == (entry.row == row("leader_joint") ? 1.5 : 3));
 
   std::vector<double> positions = model().neutral();
   positions[static_cast<std::size_t>(model().tree.first_q(slot("leader")))] = 0.3;
@@ -216,6 +294,16 @@ TEST_CASE("effects that make no sense are refused, each by its place", "[effects
   refused([&](Effects& e) { e.limits = {{leader, kNaN, 1, 0}}; }, "limits[0]", "lower is nan");
   refused([&](Effects& e) { e.limits = {{leader, kInfinity, kInfinity, 0}}; }, "limits[0]", "may only be at inf");
   refused([&](Effects& e) { e.limits = {{leader, -1, 1, 1.5}}; }, "limits[0]", "restitution is 1.5");
+  refused([&](Effects& e) { e.limits = {{.row = leader, .velocity = -1}}; }, "limits[0]", "velocity is -1");
+  refused([&](Effects& e) { e.limits = {{.row = leader, .velocity = kNaN}}; }, "limits[0]", "velocity is nan");
+  const Course unsorted{{0, 2, 1}, {0, 0, 0}}, unequal{{}, {1}};
+  for (Course Servo::*table : {&Servo::target_over_time, &Servo::target_velocity, &Servo::feedforward}) {
+    for (const auto& [course, what] : {std::pair{unsorted, "comes after 2 s"}, {unequal, "0 times and 1 values"}}) {
+      Servo servo{.row = leader, .stiffness = 1};
+      servo.*table = course;
+      refused([&](Effects& e) { e.servos = {servo}; }, "servos[0]", what);
+    }
+  }
   refused([&](Effects& e) { e.torques = {{leader, {{0, 2, 1}, {0, 0, 0}}}}; }, "torques[0]", "comes after 2 s");
   refused([&](Effects& e) { e.torques = {{leader, {{0, 1}, {0}}}}; }, "torques[0]", "2 times and 1 values");
   refused([&](Effects& e) { e.torques = {{leader, {{}, {}}}}; }, "torques[0]", "0 times");
