@@ -180,6 +180,29 @@ TEST_CASE("the plain simulator's limit gives back its share of the speed", "[pla
   }
 }
 
+TEST_CASE("the plain simulator's joints go no faster than they may", "[plain]") {
+  Effects effects;
+  effects.limits = {{.row = 0, .velocity = 0.5}};
+  PlainScene scene(one(JointType::prismatic, 2, 0.01), effects, kDown);
+  scene.advance(1, 1000);  // falls for 0.5 / g, then at 0.5 m/s
+  CHECK(scene.v[0] == Approx(-0.5));
+  CHECK(scene.q[0] == Approx(-0.5 * (1 - 0.25 / kG)).epsilon(1e-3));
+}
+
+TEST_CASE("the plain simulator's servo follows a ramp behind by its damping's share, none where the ramp's speed is given", "[plain]") {
+  // k (ramp - q) + c (given - v) = 0 once it follows
+  Effects effects;
+  effects.servos = {{.row = 0, .stiffness = 400, .damping = 60, .target_over_time = {{0, 10}, {0, 3}}, .feedforward = {{0}, {2 * kG}}}};
+  const Model model = one(JointType::prismatic, 2, 0.01);
+  PlainScene lags(model, effects, kDown);
+  lags.advance(4, 8000);
+  CHECK(lags.q[0] == Approx(0.3 * 4 - 60 * 0.3 / 400).margin(1e-9));
+  effects.servos[0].target_velocity = {{0}, {0.3}};
+  PlainScene follows(model, effects, kDown);
+  follows.advance(4, 8000);
+  CHECK(follows.q[0] == Approx(0.3 * 4).margin(1e-9));
+}
+
 TEST_CASE("in the plain simulator joints that are tied are one coordinate, at limits too", "[plain]") {
   LinkSpec a = link("a", JointType::revolute, 1, 0.02), b = link("b", JointType::revolute, 1, 0.005);
   b.mimic = "a_joint";

@@ -229,7 +229,7 @@ class Maker {
   }
 
   void make_servos() {
-    const bool limited = chance(0.4), stays = chance(0.3);
+    const bool limited = chance(0.4), stays = chance(0.3), moves = chance(0.25);
     each_screw([&](Index slot, Index row) {
       const double w = rate(), at = position_of(slot);
       const double damping = std::min(2 * w * spread(0.1, 2), (scene_.stiff ? 4 : 0.5) / h_);
@@ -238,8 +238,29 @@ class Maker {
                                        .damping = inertia(row) * damping,
                                        .target = stays ? at : at + swing_of(slot, w),
                                        .max_force = limited ? load(row) * spread(0.3, 5) : kInfinity});
+      if (moves) make_tables(scene_.effects.servos.back(), slot, w);
     });
-    scene_.bends = scene_.bends || limited;
+    scene_.bends = scene_.bends || limited || moves;
+  }
+
+  /// Targets over time that end, with their speeds or with a force beside, or without.
+  void make_tables(Servo& servo, Index slot, double w) {
+    Course course{{}, {}}, speed{{}, {}};
+    double t = 0, at = servo.target;
+    const double stretch = h_ * spread(0.7, 8);
+    for (int k = 0; k < 12; ++k) {
+      const double next = k == 11 ? at : at + 0.2 * swing_of(slot, w);
+      course.times.push_back(t);
+      course.values.push_back(at);
+      // a speed that jumps where the target bends
+      speed.times.insert(speed.times.end(), {t, t + stretch});
+      speed.values.insert(speed.values.end(), 2, k == 11 ? 0 : (next - at) / stretch);
+      t += stretch;
+      at = next;
+    }
+    servo.target_over_time = course;
+    if (chance(0.5)) servo.target_velocity = speed;
+    if (chance(0.3)) servo.feedforward = {{0, t}, {either_way(load(servo.row)), 0}};
   }
 
   void make_limits() {
@@ -257,6 +278,7 @@ class Maker {
       JointLimit limit{.row = row, .lower = q - room, .upper = q + room, .restitution = restitution};
       (v < 0 ? limit.lower : limit.upper) = v < 0 ? q - away : q + away;
       if (chance(0.3)) (v < 0 ? limit.upper : limit.lower) = v < 0 ? kInfinity : -kInfinity;
+      if (chance(0.2)) limit.velocity = std::max(std::abs(v), slides(slot) ? 0.05 : 0.3) * random_.uniform(1, 2);
       scene_.effects.limits.push_back(limit);
     });
   }

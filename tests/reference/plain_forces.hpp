@@ -7,9 +7,10 @@
 //
 //   friction    J one joint               goal 0                      |lambda| <= f dt
 //   limit       J one joint, inward       goal -gap / dt or e |v|     lambda >= 0
+//   speed       J one joint, slower       goal -most                  lambda >= 0
 //   normal      J n.velocity of contact   goal -k gap / g             lambda >= 0            compliance 1 / (g dt), g = c + k dt
 //   tangents    J across, two rows        goal 0                      |(lambda)| <= friction x lambda of the normal
-//   servo       J one joint               goal k (target - q) / g     |lambda| <= max dt     compliance 1 / (g dt), g = c + k dt
+//   servo       J one joint               goal pull at rest / g       |lambda| <= max dt     compliance 1 / (g dt), g = c + k dt
 //
 // lambda: impulse of a step of length dt [N m s, N s]. A servo of unlimited force is a force.
 #pragma once
@@ -85,8 +86,8 @@ class PlainForces {
     }
     for (const JointDamping& damper : effects_->damping) Q[damper.row] -= damper.coefficient * v[damper.row];
     for (const Servo& servo : effects_->servos) {
-      if (std::isfinite(servo.max_force) && !limited) continue;
-      const double pull = servo.stiffness * (servo.target - position(q, servo.row)) - servo.damping * v[servo.row];
+      if (is_row(servo) && !limited) continue;
+      const double pull = still_pull(servo, q, time) - servo.damping * v[servo.row];
       Q[servo.row] += std::clamp(pull, -servo.max_force, servo.max_force);
     }
     for (const JointTorque& torque : effects_->torques) Q[torque.row] += torque.force.at(time);
@@ -116,16 +117,10 @@ class PlainForces {
     }
     for (const JointDamping& damper : effects_->damping) c[damper.row] += damper.coefficient;
     for (const Servo& servo : effects_->servos) {
-      if (std::isfinite(servo.max_force)) continue;
+      if (is_row(servo)) continue;
       c[servo.row] += servo.damping;
       k[servo.row] += servo.stiffness;
     }
-  }
-
-  double armature(Index row) const {
-    double sum = 0;
-    for (const Armature& rotor : effects_->armature) sum += rotor.row == row ? rotor.inertia : 0;
-    return sum;
   }
 
   /// Over a plane; terrain and rims of cylinders are not in here.
@@ -146,20 +141,20 @@ class PlainForces {
     return side == 0 ? at - limit.lower : limit.upper - at;
   }
 
-  /// Whether anything that is sudden may act at q, or on the way from a place where nothing does.
-  bool sudden(const VectorXd& q, const std::vector<BodyMotion>& motions) const {
+  /// Whether anything that is sudden may act at q and v.
+  bool sudden(const VectorXd& q, const VectorXd& v, const std::vector<BodyMotion>& motions) const {
     for (const JointFriction& friction : effects_->friction) {
       if (friction.force > 0) return true;
     }
     for (const JointLimit& limit : effects_->limits) {
-      if (room(limit, 0, q) <= 0 || room(limit, 1, q) <= 0) return true;
+      if (room(limit, 0, q) <= 0 || room(limit, 1, q) <= 0 || std::abs(v[limit.row]) >= limit.velocity) return true;
     }
     return std::ranges::any_of(contacts(motions), [](const PlainContact& contact) { return contact.gap <= 0; });
   }
 
   /// Rows of a step of length dt that would go on with the velocities `free` if nothing sudden acted.
   std::vector<PlainRow> rows(const VectorXd& q, const VectorXd& v, const VectorXd& free, const std::vector<BodyMotion>& motions,
-                             double dt) const {
+                             double time, double dt) const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     std::vector<PlainRow> rows;
     const auto unit = [&](Index row, double sign) {
@@ -172,13 +167,14 @@ class PlainForces {
     }
     for (const Servo& servo : effects_->servos) {
       const double g = servo.damping + servo.stiffness * dt;
-      if (!std::isfinite(servo.max_force) || g == 0) continue;
+      if (!is_row(servo)) continue;
       rows.push_back({RowKind::servo, unit(servo.row, 1), -servo.max_force * dt, servo.max_force * dt,
-                      servo.stiffness * (servo.target - position(q, servo.row)) / g, 1 / (g * dt)});
+                      still_pull(servo, q, time) / g, 1 / (g * dt)});
     }
     for (const JointLimit& limit : effects_->limits) {
       for (const int side : {0, 1}) {
         const double inward = side == 0 ? 1 : -1, gap = room(limit, side, q);
+        if (-inward * free[limit.row] > limit.velocity) rows.push_back({RowKind::limit, unit(limit.row, inward), 0, kInfinity, -limit.velocity});
         if (gap + dt * std::min(inward * free[limit.row], inward * v[limit.row]) > 0) continue;
         const double back = -limit.restitution * inward * v[limit.row];
         rows.push_back({RowKind::limit, unit(limit.row, inward), 0, kInfinity, back > 0 ? back : -std::max(gap, 0.0) / dt});
@@ -204,6 +200,14 @@ class PlainForces {
   }
 
  private:
+  /// Its force is limited and follows from how the motion goes on.
+  static bool is_row(const Servo& servo) { return std::isfinite(servo.max_force) && (servo.stiffness > 0 || servo.damping > 0); }
+  /// What it pulls with at no speed.
+  double still_pull(const Servo& servo, const VectorXd& q, double time) const {
+    return servo.stiffness * (servo.target_at(time) - position(q, servo.row)) + servo.damping * servo.target_velocity.at(time) +
+           servo.feedforward.at(time);
+  }
+
   const PlainTree* tree_;
   const Effects* effects_;
   Vector3d gravity_;

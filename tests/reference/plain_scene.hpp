@@ -121,11 +121,13 @@ class PlainScene {
         if (follows[static_cast<std::size_t>(row)] == nullptr) Z(row, column++) = 1;
       }
       for (const Mimic& mimic : mimics) Z.row(mimic.follower_v) = mimic.multiplier * Z.row(mimic.leader_v);
-      for (const JointTorque& torque : effects.torques) {
-        breaks.insert(breaks.end(), torque.force.times.begin(), torque.force.times.end());
+      const auto bends = [&](const Course& course) { breaks.insert(breaks.end(), course.times.begin(), course.times.end()); };
+      for (const JointTorque& torque : effects.torques) bends(torque.force);
+      for (const Servo& servo : effects.servos) {
+        for (const Course* course : {&servo.target_over_time, &servo.target_velocity, &servo.feedforward}) bends(*course);
       }
       for (const BodyWrench& wrench : effects.wrenches) {
-        breaks.insert(breaks.end(), wrench.scale.times.begin(), wrench.scale.times.end());
+        bends(wrench.scale);
         for (const double edge : {wrench.from, wrench.to}) {
           if (std::isfinite(edge)) breaks.push_back(edge);
         }
@@ -195,7 +197,7 @@ class PlainScene {
   void step(double t, double dt) {
     const Within within{t, t + dt};
     const std::vector<BodyMotion> motions = body_motions(tree(), q, v);
-    if (!fixed_->forces.sudden(q, motions)) {
+    if (!fixed_->forces.sudden(q, v, motions)) {
       // order 4
       VectorXd dq[4], dv[4];
       for (int stage = 0; stage < 4; ++stage) {
@@ -207,7 +209,7 @@ class PlainScene {
       }
       const VectorXd ahead = unit_quaternions(q + dt / 6 * (dq[0] + 2 * dq[1] + 2 * dq[2] + dq[3]));
       const VectorXd rate = v + dt / 6 * (dv[0] + 2 * dv[1] + 2 * dv[2] + dv[3]);
-      if (!fixed_->forces.sudden(ahead, body_motions(tree(), ahead, rate))) {
+      if (!fixed_->forces.sudden(ahead, rate, body_motions(tree(), ahead, rate))) {
         q = ahead;
         v = rate;
         return;
@@ -228,7 +230,7 @@ class PlainScene {
     const Eigen::LLT<MatrixXd> A(Z.transpose() * M * Z);
     const VectorXd force = fixed_->forces.force(q, v, t, motions, false) - bias_force(tree(), motions) - dt * k.cwiseProduct(v);
     VectorXd after = v + Z * A.solve(dt * (Z.transpose() * force));
-    const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, dt);
+    const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, t, dt);
     if (!rows.empty()) {
       MatrixXd W(static_cast<Eigen::Index>(rows.size()), tree().velocities);
       for (std::size_t r = 0; r < rows.size(); ++r) W.row(static_cast<Eigen::Index>(r)) = rows[r].J;
