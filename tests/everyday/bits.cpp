@@ -1,0 +1,143 @@
+// The same scene must be the same to the bit however it is run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "engine/batch.hpp"
+#include "families.hpp"
+#include "models/random.hpp"
+#include "tests/scratch_folder.hpp"
+
+namespace linden {
+namespace {
+
+constexpr std::int64_t kSteps = 40;
+constexpr std::uint64_t kHere = 0;  // company of this number is the scene itself
+
+/// A start like the scene's.
+InitialState company(const EverydayScene& scene, std::uint64_t number) {
+  if (number == kHere) return scene.start;
+  return random_around(*scene.model, scene.start, scene.number * 64 + number, 0.2);
+}
+
+/// All that is to be told of an instance.
+struct Told {
+  std::vector<double> q, p, v, energy;
+  InstanceRecord record;
+
+  /// What differs first; empty: nothing.
+  std::string differs(const Told& other) const {
+    const auto same = [](const std::vector<double>& a, const std::vector<double>& b) {
+      return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+    };
+    if (!same(q, other.q)) return "positions";
+    if (!same(p, other.p)) return "momenta";
+    if (!same(v, other.v)) return "velocities";
+    if (!same(energy, other.energy)) return "energies";
+    return record == other.record ? "" : "records";
+  }
+};
+
+std::vector<double> numbers(const auto& rows) { return {rows.begin(), rows.end()}; }
+
+std::vector<Told> told(const Batch& batch) {
+  const Batch::Observation observed = batch.observe();
+  std::vector<Told> result;
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    result.push_back({numbers(batch.positions().instance(i)), numbers(batch.momenta().instance(i)), numbers(observed.velocities().instance(i)),
+                      numbers(observed.energies().instance(i)), batch.record(i)});
+  }
+  return result;
+}
+
+Batch batch_of(const EverydayScene& scene, const std::vector<std::uint64_t>& who, int threads) {
+  BatchOptions options;
+  static_cast<Options&>(options) = scene.options;
+  options.threads = threads;
+  Batch batch(scene.model, static_cast<std::int64_t>(who.size()), options, scene.effects);
+  for (std::size_t i = 0; i < who.size(); ++i) {
+    const InitialState start = company(scene, who[i]);
+    batch.reset(static_cast<std::int64_t>(i), start.positions, start.velocities);
+  }
+  return batch;
+}
+
+void compare(const std::vector<Told>& a, const std::vector<Told>& b, const char* what, Differences& found) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const std::string differs = a[i].differs(b[i]);
+    if (differs.empty()) continue;
+    found.add(Check::bits, what, fmt::format("{}: {} of instance {} differ; expected the same bytes", what, differs, i));
+    return;
+  }
+}
+
+void check_batches(const EverydayScene& scene, Differences& found) {
+  const std::vector<std::uint64_t> all{1, 2, 3, kHere, 4, 5, 6, 7, 8};
+  Batch one = batch_of(scene, all, 1);
+  one.step(kSteps);
+  const std::vector<Told> expected = told(one);
+
+  Batch two = batch_of(scene, all, 2);
+  two.step(kSteps);
+  compare(expected, told(two), "two threads", found);
+
+  Batch split = batch_of(scene, all, 1);
+  for (std::int64_t k = 0; k < kSteps; ++k) split.step(1);
+  compare(expected, told(split), "steps one by one", found);
+
+  Batch both = batch_of(scene, all, 2);
+  for (std::int64_t k = 0; k < kSteps; k += 5) both.step(5);
+  compare(expected, told(both), "two threads, five steps at a time", found);
+
+  Batch other = batch_of(scene, {9, 10, kHere, 11, 12, 13, kHere}, 1);
+  other.step(kSteps / 2);
+  other.step(kSteps - kSteps / 2);
+  const std::vector<Told> others = told(other);
+  compare({expected[3], expected[3]}, {others[2], others[6]}, "other company and place", found);
+
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const InitialState start = company(scene, all[i]);
+    one.reset(static_cast<std::int64_t>(i), start.positions, start.velocities);
+  }
+  one.step(kSteps);
+  compare(expected, told(one), "after a reset", found);
+}
+
+Told told(Simulation& simulation) {
+  const Energy energy = simulation.energy();
+  const EffectWork<double>& work = simulation.effect_work();
+  return {numbers(simulation.positions()), numbers(simulation.momenta()), simulation.velocities(),
+          {energy.kinetic, energy.potential, work.taken(), work.given()}, {}};
+}
+
+void check_simulations(const EverydayScene& scene, Differences& found) {
+  const std::int64_t half = kSteps / 2;
+  Simulation whole = simulation_of(scene, scene.options.step), single = simulation_of(scene, scene.options.step),
+             resumed = simulation_of(scene, scene.options.step);
+  whole.run(kSteps);
+  const ScratchFolder folder;
+  for (std::int64_t k = 0; k < kSteps; ++k) {
+    if (k == half) {
+      single.save(folder.file("half.ckpt"));
+      resumed.load(folder.file("half.ckpt"));
+    }
+    if (!single.step().ok()) return;  // the rest is refused anyhow
+    if (k >= half && !resumed.step().ok()) break;
+  }
+  const Told expected = told(single);
+  compare({expected}, {told(whole)}, "run(n) and n times step()", found);
+  // what effects gave and took is counted from the checkpoint on
+  Told since = told(resumed);
+  std::copy_n(expected.energy.begin() + 2, 2, since.energy.begin() + 2);
+  compare({expected}, {since}, "from a checkpoint", found);
+}
+
+}  // namespace
+
+void check_bits(const EverydayScene& scene, Differences& found) {
+  check_batches(scene, found);
+  check_simulations(scene, found);
+}
+
+}  // namespace linden

@@ -1,0 +1,36 @@
+// tests/everyday/families.hpp
+// The checks one by one, as tests/everyday/check.cpp calls them.
+#pragma once
+
+#include "check.hpp"
+#include "walk.hpp"
+
+namespace linden {
+
+class Differences {
+ public:
+  explicit Differences(std::optional<Check> only) : only_(only) {}
+  bool asked(Check check) const { return !only_ || *only_ == check; }
+  /// The first of a kind is kept.
+  void add(Check check, const std::string& what, const std::string& text) {
+    if (!asked(check)) return;
+    for (const Difference& one : list) {
+      if (one.check == check && one.what == what) return;
+    }
+    list.push_back({check, what, text});
+  }
+  std::vector<Difference> list;
+
+ private:
+  std::optional<Check> only_;
+};
+
+void check_refused(const EverydayScene& scene, const Walk& walk, Differences& found);
+void check_position(const EverydayScene& scene, Differences& found);
+void check_energy(const EverydayScene& scene, const Walk& walk, Differences& found);
+/// What rests, and velocities at nodes.
+void check_velocities(const EverydayScene& scene, const Walk& walk, Differences& found);
+void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found);
+void check_bits(const EverydayScene& scene, Differences& found);
+
+}  // namespace linden

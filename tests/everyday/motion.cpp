@@ -1,0 +1,404 @@
+// Checks of one instance: refusals, positions beside the plain simulator, energies, velocities.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/batch.hpp"
+#include "families.hpp"
+#include "models/random.hpp"
+
+namespace linden {
+
+using Eigen::VectorXd;
+using reference::PlainScene;
+
+namespace {
+
+constexpr double kTurns = 0.5;  // of a body within a step: from there on the step does not represent the motion [rad]
+
+std::string at(const EverydayScene& scene, std::size_t node) {
+  return fmt::format("step {} ({:.4g} s)", node, static_cast<double>(node) * scene.options.step);
+}
+
+std::string row_name(const EverydayScene& scene, Index row) { return scene.model->names.velocity[static_cast<std::size_t>(row)]; }
+
+/// Largest turn of a body within the step that follows.
+double turn_within(PlainScene plain, double step) {
+  constexpr int kParts = 8;
+  std::vector<double> turns(plain.tree().bodies.size(), 0.0);
+  for (int part = 0; part < kParts; ++part) {
+    plain.advance(step / kParts, 2);
+    const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);
+    for (std::size_t i = 0; i < turns.size(); ++i) turns[i] += motions[i].w.norm() * step / kParts;
+  }
+  return *std::ranges::max_element(turns);
+}
+
+/// Where the plain simulator is at four times up to the horizon, and what its motion says about errors.
+struct Track {
+  std::vector<VectorXd> q;
+  double bent = 0;    // sum over steps of the second difference of velocities
+  VectorXd sudden;    // changes of velocity that sudden effects gave
+};
+
+constexpr std::int64_t kLooks = 4;
+
+Track track(PlainScene plain, const EverydayScene& scene, int parts) {
+  Track result;
+  const double h = scene.options.step;
+  VectorXd before = plain.v, earlier = plain.v;
+  for (std::int64_t k = 1; k <= scene.horizon; ++k) {
+    plain.advance(h, parts);
+    if (k > 1) result.bent += size_of(*scene.model, plain.v - 2 * before + earlier);
+    earlier = before;
+    before = plain.v;
+    if (k * kLooks / scene.horizon > (k - 1) * kLooks / scene.horizon) result.q.push_back(plain.q);
+  }
+  result.sudden = plain.sudden;
+  return result;
+}
+
+/// The engine at the same times, at h / halved.
+std::vector<VectorXd> looks(const EverydayScene& scene, int halved) {
+  Simulation simulation = simulation_of(scene, scene.options.step / halved);
+  std::vector<VectorXd> result;
+  for (std::int64_t k = 1; k <= scene.horizon; ++k) {
+    for (int part = 0; part < halved; ++part) {
+      if (!simulation.step().ok()) return {};
+    }
+    if (k * kLooks / scene.horizon > (k - 1) * kLooks / scene.horizon) result.push_back(vector_of(simulation.positions()));
+  }
+  return result;
+}
+
+double apart(const EverydayScene& scene, const reference::PlainTree& tree, const VectorXd& a, const VectorXd& b) {
+  return size_of(*scene.model, mean_velocity(tree, a, b, 1));
+}
+
+double apart(const EverydayScene& scene, const reference::PlainTree& tree, const std::vector<VectorXd>& a, const std::vector<VectorXd>& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) most = std::max(most, apart(scene, tree, a[k], b[k]));
+  return most;
+}
+
+VectorXd random_rows(Random& random, Eigen::Index rows) {
+  VectorXd result(rows);
+  for (double& x : result) x = random.uniform(-1, 1);
+  return result;
+}
+
+}  // namespace
+
+void check_refused(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  if (walk.failed.ok()) return;
+  const Node& last = walk.nodes.back();
+  const auto steps = walk.nodes.size() - 1;
+  const double turn = turn_within(plain_of(scene, last.q, last.v, static_cast<double>(steps) * scene.options.step), scene.options.step);
+  if (turn > kTurns) return;
+  constexpr std::array<const char*, 5> kStatus{"", "not converged", "past pi", "gains energy", "not finite"};
+  found.add(Check::refused, kStatus[static_cast<std::size_t>(walk.failed.status)],
+            fmt::format("{} is refused: {}; expected a step: bodies turn by {:.1e} rad at most within it", at(scene, steps), walk.failure,
+                        turn));
+}
+
+namespace {
+
+/// How far a second-order step may be from the plain simulator, or one of first order where something is sudden.
+double position_bound(const EverydayScene& scene, const PlainScene& start, const Track& plain, const Track& coarse, int parts) {
+  const reference::PlainTree& tree = start.tree();
+  const double h = scene.options.step, duration = static_cast<double>(scene.horizon) * h;
+  Random random(scene.seed ^ (scene.number << 20));
+  if (!scene.sudden) {
+    // what the motion makes of a small change of its start, over what it would do by itself
+    constexpr double kSmall = 1e-6;
+    PlainScene other = start;
+    other.start(start.q, start.v + kSmall / duration * random_rows(random, start.v.size()));
+    return 4 * h * plain.bent * std::max(1.0, apart(scene, tree, track(other, scene, parts / 2).q, coarse.q) / kSmall);
+  }
+  // changes of a step's size, both ways: what sudden events then do
+  double spread = 0;
+  const VectorXd within = h * start.acceleration();
+  for (const double way : {0.5, -0.5}) {
+    PlainScene other = start;
+    const VectorXd kick = way * within.cwiseProduct(random_rows(random, within.size()));
+    other.start(reference::advanced(tree, start.q, way * h * start.v), start.v + kick);
+    spread = std::max(spread, apart(scene, tree, track(other, scene, parts / 2).q, coarse.q));
+  }
+  return 2 * (h * size_of(*scene.model, plain.sudden) + h * plain.bent + spread);
+}
+
+}  // namespace
+
+void check_position(const EverydayScene& scene, Differences& found) {
+  if (scene.stiff) return;
+  const PlainScene start = plain_of(scene);
+  const reference::PlainTree& tree = start.tree();
+  const double h = scene.options.step, duration = static_cast<double>(scene.horizon) * h;
+  const int parts = scene.sudden ? 16 : 2 * std::max(1, static_cast<int>(std::ceil(2 * start.stiffest_rate() * h)));
+  const Track plain = track(start, scene, parts), coarse = track(start, scene, parts / 2);
+  // infinite where a step is refused, which is another check's
+  const auto error_of = [&](int halved) {
+    const std::vector<VectorXd> engine = looks(scene, halved);
+    return engine.empty() ? std::numeric_limits<double>::infinity() : apart(scene, tree, plain.q, engine);
+  };
+  const double error = error_of(1), half = error_of(2);
+  if (!std::isfinite(error + half)) return;
+  const double floor = 4 * apart(scene, tree, plain.q, coarse.q) + 1e-10 * (1 + size_of(*scene.model, start.v) * duration);
+  const double bound = position_bound(scene, start, plain, coarse, parts);
+  const char* what = scene.sudden ? "sudden" : scene.bends ? "smooth, forces that jump" : "smooth";
+  const auto differs = [&](double expected, double found_at, int halved) {
+    found.add(Check::position, what,
+              fmt::format("after {} steps positions are off the plain simulator's by {:.3g} (rad, or 0.2 m), with half the step by {:.3g}; "
+                          "expected {:.3g} at most with {} of the step, found {:.3g}",
+                          scene.horizon, error, half, expected, halved == 1 ? "the whole" : halved == 2 ? "half" : "a quarter", found_at));
+  };
+  if (!(error <= (scene.sudden ? 4 : 20) * bound + floor)) {
+    differs((scene.sudden ? 4 : 20) * bound + floor, error, 1);
+  } else if (!scene.sudden && !scene.bends) {
+    if (error > 20 * floor && !(half <= 0.35 * error + floor)) differs(0.35 * error + floor, half, 2);
+  } else if (error > 0.25 * bound + floor) {
+    // at a quarter of the step a quarter is left, or less; events may fall anywhere within steps
+    const double quarter = error_of(4);
+    if (quarter > 0.6 * error + floor && std::isfinite(quarter)) differs(0.6 * error + floor, quarter, 4);
+  }
+}
+
+namespace {
+
+/// Joint friction acts at the beginning of a step, half a step early (kernels/effects/friction.hpp): a first order of its own, h f |v|. Each
+/// time a joint stops, starts or turns it does so within a step: h f at a speed of up to h f / inertia.
+double friction_leaves(const EverydayScene& scene, const Walk& walk) {
+  if (scene.effects.friction.empty()) return 0;
+  const PlainScene plain = plain_of(scene);
+  const std::vector<Index> position = reference::position_rows(plain.tree());
+  const VectorXd inertia = plain.row_inertia();
+  double sum = 0;
+  for (const JointFriction& friction : scene.effects.friction) {
+    const Index row = position[static_cast<std::size_t>(friction.row)];
+    const double impulse = scene.options.step * friction.force;
+    double way = 0, most = 0;
+    for (std::size_t k = 1; k < walk.nodes.size(); ++k) {
+      const double moved = walk.nodes[k].q[row] - walk.nodes[k - 1].q[row], now = moved > 0 ? 1 : moved < 0 ? -1 : 0;
+      if (now != way) sum += impulse * impulse / inertia[friction.row];
+      way = now;
+      most = std::max(most, std::abs(moved));
+    }
+    sum += friction.force * most;
+  }
+  return sum;
+}
+
+}  // namespace
+
+void check_energy(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  if (walk.nodes.size() < 8) return;
+  const double h = scene.options.step;
+  // of the change of velocities that smooth forces and friction give in a step
+  double second_order = 0, kinetic = 0, most = 0, least = 0, moved = 0;
+  const std::size_t stride = std::max<std::size_t>(1, walk.nodes.size() / 24);
+  for (std::size_t k = 0; k < walk.nodes.size(); ++k) {
+    const Node& node = walk.nodes[k];
+    kinetic = std::max(kinetic, node.energy.kinetic);
+    const double potential = node.energy.potential - walk.nodes[0].energy.potential;
+    most = std::max(most, potential);
+    least = std::min(least, potential);
+    moved = std::max(moved, node.work.magnitude());
+    if (k % stride != 0 && k > 40) continue;
+    const PlainScene plain = plain_of(scene, node.q, node.v, static_cast<double>(k) * h);
+    VectorXd change = h * plain.acceleration();
+    const VectorXd inertia = plain.row_inertia();
+    double sum = 0.5 * change.dot(plain.mass_matrix() * change);
+    for (const JointFriction& friction : scene.effects.friction) sum += 0.5 * h * h * friction.force * friction.force / inertia[friction.row];
+    if (scene.effects.ground) {
+      const double push = scene.effects.ground->stiffness;
+      const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);
+      const reference::PlainForces forces(plain.tree(), scene.effects, scene.options.gravity);
+      for (const auto& contact : forces.contacts(motions)) {
+        if (contact.gap > 0) continue;
+        // of the push, and of its change along the way
+        const double mass = scene.model->constants.inertia(contact.slot, 0);
+        const double way = h * motions[static_cast<std::size_t>(contact.slot)].velocity.norm(), impulse = h * push * (way - contact.gap);
+        sum += 0.5 * impulse * impulse / mass + push * way * way;
+      }
+    }
+    second_order = std::max(second_order, sum);
+  }
+  const double scale = kinetic + (most - least) + moved;
+  // the solver's tolerance is 1e-10 of the root of the energy, in each step
+  const double rounding = (1e-8 + 4e-10 * static_cast<double>(walk.nodes.size())) * scale;
+  const double allowed = rounding + 8 * second_order + friction_leaves(scene, walk);
+
+  const double first = walk.nodes[0].balance();
+  // a blow may be booked a step or two after it: what stays counts
+  constexpr std::size_t kStays = 4;
+  double worst = 0;
+  std::size_t where = 0;
+  for (std::size_t k = 0; k + kStays <= walk.nodes.size(); ++k) {
+    double stays = std::numeric_limits<double>::infinity();
+    for (std::size_t j = k; j < k + kStays; ++j) stays = std::min(stays, std::abs(walk.nodes[j].balance() - first));
+    if (!(stays <= worst)) {
+      worst = stays;
+      where = k;
+    }
+  }
+  if (!(worst <= allowed)) {
+    found.add(Check::energy, "ledger",
+              fmt::format("{}: energy and what was taken less what was given strays by {:.3g} J; expected {:.3g} J at most (energies of "
+                          "{:.3g} J)",
+                          at(scene, where), walk.nodes[where].balance() - first, allowed, scale));
+  }
+  const auto gives = [&](const char* effect, double EffectWork<double>::* taken, bool there) {
+    if (!there) return;
+    double peak = 0, drop = 0;
+    std::size_t place = 0;
+    for (std::size_t k = 0; k < walk.nodes.size(); ++k) {
+      const double now = walk.nodes[k].work.*taken;
+      peak = std::max(peak, now);
+      if (!(peak - now <= drop)) {
+        drop = peak - now;
+        place = k;
+      }
+    }
+    if (!(drop <= allowed)) {
+      found.add(Check::energy, fmt::format("{} gives", effect),
+                fmt::format("{}: {} gave {:.3g} J; expected nothing, {:.3g} J at most (energies of {:.3g} J)", at(scene, place), effect, drop,
+                            allowed, scale));
+    }
+  };
+  gives("damping", &EffectWork<double>::damping, !scene.effects.damping.empty());
+  gives("friction", &EffectWork<double>::friction, !scene.effects.friction.empty());
+  gives("a limit", &EffectWork<double>::limits, !scene.effects.limits.empty());
+  gives("drag", &EffectWork<double>::drag, !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
+  gives("ground", &EffectWork<double>::ground, scene.effects.ground.has_value());
+}
+
+namespace {
+
+/// Velocities read at a node, beside the means of the two steps before and the two after it.
+class Reader {
+ public:
+  Reader(const EverydayScene& scene, const Walk& walk, const char* who) : scene_(scene), who_(who), plain_(plain_of(scene)) {
+    double kinetic = 0;
+    for (const Node& node : walk.nodes) kinetic = std::max(kinetic, node.energy.kinetic);
+    // the solver's tolerance is of the root of the energy, which may all be one row's
+    inertia_ = plain_.row_inertia();
+    most_ = (2 * kinetic * inertia_.cwiseInverse()).cwiseSqrt();
+    known_ = 1e-8 * most_;
+    known_.array() += 3e-6;
+    first_.resize(known_.size());
+    count_.setOnes(known_.size());
+    for (Index i = 1; i < plain_.tree().slots(); ++i) {
+      const reference::PlainBody& body = plain_.tree().body(i);
+      for (Index k = 0; k < body.dofs(); ++k) {
+        first_[body.v + k] = body.v + (k < 3 ? 0 : 3);
+        if (body.kind != JointKind::screw) count_[body.v + k] = 3;
+      }
+    }
+  }
+
+  /// q: five positions, v at the middle one.
+  void look(std::size_t node, const std::array<const VectorXd*, 5>& q, const VectorXd& v, Differences& found) const {
+    std::array<VectorXd, 4> mean;
+    for (std::size_t k = 0; k < 4; ++k) mean[k] = mean_velocity(plain_.tree(), *q[k], *q[k + 1], scene_.options.step);
+    // of second order are momenta too: ad_V^T ad_V^T G V h^2 / 12 of a body that turns and moves on
+    double turn = 0, moving = 0;
+    const auto motions = reference::body_motions(plain_.tree(), *q[2], mean[1]);
+    for (std::size_t i = 1; i < motions.size(); ++i) {
+      const reference::PlainBody& body = plain_.tree().bodies[i];
+      turn = std::max(turn, motions[i].w.norm());
+      moving += body.mass() * motions[i].velocity_at(motions[i].world(reference::center_of(body))).squaredNorm();
+    }
+    const double step = scene_.options.step;
+    std::array<VectorXd, 3> change;
+    for (std::size_t k = 0; k < 3; ++k) change[k] = mean[k + 1] - mean[k];
+    for (Index row = 0; row < v.size(); ++row) {
+      double speed = 0, bend = 0;
+      for (std::size_t k = 0; k < 4; ++k) speed = std::max(speed, std::abs(mean[k][row]));
+      // the three rows of an angular or of a linear velocity are one vector, in a frame that turns
+      for (const VectorXd& one : change) bend = std::max(bend, 2 * one.segment(first_[row], count_[row]).norm());
+      bend += step * step * turn * (0.25 * turn * most_[row] + moving / (3 * inertia_[row]));
+      const double middle = 0.5 * (mean[1][row] + mean[2][row]);
+      if (!std::isfinite(v[row])) {
+        found.add(Check::velocity, fmt::format("{}: not finite", who_), fmt::format("{}: {} reads {}", at(scene_, node), row_name(scene_, row), v[row]));
+      } else if (speed <= 0.1 * known_[row]) {
+        if (std::abs(v[row]) <= known_[row]) continue;
+        found.add(Check::rest, fmt::format("{}: rests and reads a speed", who_),
+                  fmt::format("{}: {} stands still and reads {:.3g} per s; expected {:.1g} at most", at(scene_, node), row_name(scene_, row),
+                              v[row], known_[row]));
+      } else if (!(std::abs(v[row] - middle) <= bend + known_[row])) {
+        found.add(Check::velocity, fmt::format("{}: not the motion's", who_),
+                  fmt::format("{}: {} reads {:.6g} per s; expected {:.6g}, that of the positions around it, within {:.2g}", at(scene_, node),
+                              row_name(scene_, row), v[row], middle, bend + known_[row]));
+      }
+    }
+    for (const JointLimit& limit : scene_.effects.limits) after_blow(limit, node, *q[2], mean, v, found);
+  }
+
+ private:
+  /// On a limit: the velocity is that with which it goes on.
+  void after_blow(const JointLimit& limit, std::size_t node, const VectorXd& q, const std::array<VectorXd, 4>& mean, const VectorXd& v,
+                  Differences& found) const {
+    const Index row = limit.row;
+    const double place = q[reference::position_rows(plain_.tree())[static_cast<std::size_t>(row)]];
+    const bool low = std::abs(place - limit.lower) < 1e-12, high = std::abs(place - limit.upper) < 1e-12;
+    if (!low && !high) return;
+    const double on = mean[2][row], slack = 2 * std::abs(mean[3][row] - on) + known_[row];
+    if (std::abs(v[row] - on) <= slack) return;
+    found.add(Check::rest, fmt::format("{}: speed on a limit", who_),
+              fmt::format("{}: {} is on its limit and reads {:.6g} per s; expected {:.6g}, with which it goes on, within {:.2g}",
+                          at(scene_, node), row_name(scene_, row), v[row], on, slack));
+  }
+
+  const EverydayScene& scene_;
+  std::string who_;
+  PlainScene plain_;
+  VectorXd inertia_, most_, known_;  // of rows; what all energy would give one; what is known of it
+  Eigen::VectorXi first_, count_;
+};
+
+}  // namespace
+
+void check_velocities(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  const std::size_t nodes = walk.nodes.size();
+  if (nodes < 5) return;
+  const Reader reader(scene, walk, "simulation");
+  // every node where the motion begins and ends, some between
+  const std::size_t stride = std::max<std::size_t>(1, nodes / 64);
+  for (std::size_t k = 2; k + 2 < nodes; ++k) {
+    if (k > 48 && k + 24 < nodes && k % stride != 0) continue;
+    reader.look(k, {&walk.nodes[k - 2].q, &walk.nodes[k - 1].q, &walk.nodes[k].q, &walk.nodes[k + 1].q, &walk.nodes[k + 2].q}, walk.nodes[k].v,
+                found);
+  }
+}
+
+void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found) {
+  if (!walk.failed.ok()) return;
+  BatchOptions options;
+  static_cast<Options&>(options) = scene.options;
+  options.threads = 1;
+  Batch batch(scene.model, 1, options, scene.effects);
+  batch.reset(0, scene.start.positions, scene.start.velocities);
+  const Reader reader(scene, walk, "batch");
+  std::int64_t taken = 0;
+  for (const std::int64_t until : {scene.horizon, scene.steps}) {
+    batch.step(until - taken - 4);
+    taken = until;
+    std::array<VectorXd, 5> q;
+    VectorXd v;
+    for (std::size_t k = 0; k < 5; ++k) {
+      if (k > 0) batch.step(1);
+      q[k] = batch.positions().instance(0);
+      if (k == 2) v = batch.observe().velocities().instance(0);
+    }
+    if (batch.record(0).status != StepStatus::converged) {
+      // a Simulation took these steps
+      found.add(Check::refused, "batch alone", fmt::format("in a batch: {}; expected what a Simulation takes", batch.describe(0)));
+      return;
+    }
+    reader.look(static_cast<std::size_t>(until - 2), {&q[0], &q[1], &q[2], &q[3], &q[4]}, v, found);
+    if (scene.steps - scene.horizon < 8) return;
+  }
+}
+
+}  // namespace linden

@@ -1,0 +1,425 @@
+#include "scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "layout/builder.hpp"
+#include "layout/contacts.hpp"
+#include "models/random.hpp"
+#include "tests/reference/plain_scene.hpp"
+
+namespace linden {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+enum Kind { swing, settle, servo, friction, limits, push, torque, drag, rest_on_ground, drop, anything, kinds };
+constexpr std::array<const char*, kinds> kNames{"swing",  "settle", "servo", "friction",       "limits", "push",
+                                                "torque", "drag",   "rest on ground", "drop", "anything"};
+
+class Maker {
+ public:
+  Maker(std::uint64_t seed, std::uint64_t number) : random_(seed * 0x100000001b3ull + number) {
+    random_.next();
+    scene_.seed = seed;
+    scene_.number = number;
+  }
+
+  EverydayScene make() {
+    kind_ = static_cast<Kind>(random_.below(kinds));
+    scene_.kind = kNames[kind_];
+    scene_.stiff = chance(0.12);
+    h_ = scene_.options.step = spread(1e-4, 1e-2);
+    scene_.horizon = static_cast<std::int64_t>(16 + random_.below(25));
+    if (!wants(0.85, kind_ == settle || kind_ == rest_on_ground || kind_ == drop)) {
+      scene_.options.gravity = {0, 0, 0};
+    } else if (chance(0.06)) {
+      const Vector3d g = 9.81 * (random_.rotation() * Vector3d::UnitZ());
+      if (!on_ground()) scene_.options.gravity = {g.x(), g.y(), g.z()};
+    }
+    make_model();
+    make_start();
+    measure();
+    make_effects();
+    choose_length();
+    scene_.sudden = !scene_.effects.friction.empty() || !scene_.effects.limits.empty() || scene_.effects.ground;
+    return std::move(scene_);
+  }
+
+ private:
+  bool chance(double p) { return random_.uniform(0, 1) < p; }
+  /// Log-uniform.
+  double spread(double low, double high) { return std::exp(random_.uniform(std::log(low), std::log(high))); }
+  double either_way(double size) { return random_.uniform(-size, size); }
+  bool on_ground() const { return kind_ == rest_on_ground || kind_ == drop; }
+  /// Always where the scene is about it, else by chance: often in scenes of anything.
+  bool wants(double p, bool about) { return about || chance(kind_ == anything ? std::max(p, 0.3) : p); }
+  /// A rate [1/s] that the step resolves, or, in a stiff scene, may not.
+  double rate() { return std::min(spread(0.005, scene_.stiff ? 4 : 0.3) / h_, scene_.stiff ? 1e4 : 500); }
+  /// How far from rest something may start that swings at a rate w: joints of robots move at some rad/s.
+  double swing_of(Index slot, double w) { return either_way(std::min(slides(slot) ? 0.1 : 0.8, (slides(slot) ? 1.0 : 5.0) / w)); }
+  double position_of(Index slot) const { return scene_.start.positions[static_cast<std::size_t>(model().tree.first_q(slot))]; }
+
+  void make_model() {
+    const std::array<Index, 10> sizes{1, 1, 2, 2, 3, 4, 5, 6, 8, 12};
+    const Index joints = std::max<Index>(1, sizes[random_.below(10)] - (chance(0.3) ? 1 : 0));
+    const bool floating = on_ground() || chance(0.3);
+    const double shape = random_.uniform(0, 1);
+    TreeBuilder builder(fmt::format("everyday scene {}", scene_.number));
+    std::vector<double> length;
+    std::vector<Index> screws;
+    std::vector<JointType> types;
+    for (Index i = 0; i < joints; ++i) {
+      LinkSpec link;
+      link.name = fmt::format("link{}", i + 1);
+      link.joint = fmt::format("joint{}", i + 1);
+      const bool root = i == 0 || chance(0.03);
+      length.push_back(spread(0.05, 0.5));
+      const double width = length.back() * random_.uniform(0.1, 0.6), mass = spread(0.05, 10);
+      const bool round = chance(0.3);
+      if (root && floating) {
+        link.type = JointType::free;
+        link.placement.translation() = Vector3d(0, 2.0 * i, 0);
+      } else {
+        const double what = random_.uniform(0, 1);
+        link.type = what < 0.58   ? JointType::revolute
+                    : what < 0.73 ? JointType::prismatic
+                    : what < 0.81 ? JointType::helical
+                    : what < 0.97 ? JointType::ball
+                                  : JointType::planar;
+        if (chance(0.4)) link.placement.linear() = random_.rotation().toRotationMatrix();
+        const std::array<Vector3d, 3> axes{Vector3d::UnitX(), Vector3d::UnitY(), Vector3d::UnitZ()};
+        link.axis = chance(0.6) ? axes[1 + random_.below(2)] : Vector3d(random_.rotation() * Vector3d::UnitZ());
+        link.pitch = (chance(0.5) ? 1 : -1) * spread(0.003, 0.1);
+      }
+      if (!root) {
+        const auto parent = static_cast<Index>(shape < 0.5 ? i - 1 : shape < 0.85 ? static_cast<Index>(random_.below(static_cast<std::uint64_t>(i))) : 0);
+        link.parent = fmt::format("link{}", parent + 1);
+        link.placement.translation() = Vector3d(length[static_cast<std::size_t>(parent)], 0, 0);
+      }
+      // centred where nothing carries it, else behind its joint
+      const Vector3d center = link.type == JointType::free ? Vector3d(Vector3d::Zero()) : Vector3d(0.5 * length.back(), 0, 0);
+      const Vector3d size(length.back(), width, width * random_.uniform(0.5, 1));
+      link.inertia = round ? sphere_inertia(mass, 0.5 * width, center) : box_inertia(mass, size, center);
+      if (link.type == JointType::free || chance(0.4)) {
+        if (round) {
+          LinkShape ball;
+          ball.pose.translation() = center;
+          ball.shape.kind = ShapeKind::sphere;
+          ball.shape.size = {0.5 * width, 0, 0};
+          link.shapes = {ball};
+        } else {
+          link.shapes = {box_shape(size, center)};
+        }
+      }
+      const bool screw = link.type == JointType::revolute || link.type == JointType::prismatic || link.type == JointType::helical;
+      if (screw && !screws.empty() && chance(0.12)) {
+        link.mimic = fmt::format("joint{}", screws[random_.below(screws.size())] + 1);
+        link.multiplier = (chance(0.5) ? 1 : -1) * spread(0.5, 2);
+        link.offset = chance(0.5) ? 0 : either_way(0.2);
+      } else if (screw) {
+        screws.push_back(i);
+      }
+      builder.add(std::move(link));
+    }
+    scene_.model = std::make_shared<const Model>(builder.build());
+    for (const Mimic& mimic : model().mimics) followers_.insert(mimic.follower_v);
+  }
+
+  const Model& model() const { return *scene_.model; }
+  template <class Visit>
+  void each_screw(const Visit& visit) const {
+    for (Index i = 1; i < model().tree.shape.slots; ++i) {
+      const Index row = model().tree.first_v(i);
+      if (model().tree.kind(i) == JointKind::screw && !followers_.contains(row)) visit(i, row);
+    }
+  }
+  bool slides(Index slot) const { return model().constants.screw(slot, 0) == 0; }
+
+  void make_start() {
+    InitialState& start = scene_.start;
+    start.positions = model().neutral();
+    start.velocities.assign(static_cast<std::size_t>(model().tree.shape.velocities), 0.0);
+    const bool bent = chance(0.7), moves = kind_ == swing || kind_ == drag || (kind_ != rest_on_ground && chance(0.5));
+    const double fast = chance(0.1) ? 8 : 2;
+    for (Index i = 1; i < model().tree.shape.slots; ++i) {
+      const JointKind joint = model().tree.kind(i);
+      double* q = &start.positions[static_cast<std::size_t>(model().tree.first_q(i))];
+      double* v = &start.velocities[static_cast<std::size_t>(model().tree.first_v(i))];
+      const Eigen::Quaterniond turn = random_.rotation().slerp(random_.uniform(0, 1), Eigen::Quaterniond::Identity());
+      if (joint == JointKind::screw) {
+        if (bent) q[0] = either_way(slides(i) ? 0.2 : 1.2);
+        if (moves) v[0] = either_way(slides(i) ? 0.3 : fast);
+        continue;
+      }
+      const bool flat = on_ground() && joint == JointKind::free && (kind_ == rest_on_ground || chance(0.3));
+      double* quaternion = joint == JointKind::free ? q + 3 : q;
+      if (bent && !flat) std::copy_n(turn.coeffs().data(), 4, quaternion);
+      if (!moves) continue;
+      for (Index k = 0; k < 3; ++k) v[k] = either_way(flat ? 0 : fast);
+      for (Index k = 3; k < velocity_count(joint); ++k) v[k] = either_way(1);
+    }
+  }
+
+  reference::PlainScene plain() const {
+    reference::PlainScene result(model(), scene_.effects, scene_.options.gravity);
+    result.start(Eigen::Map<const VectorXd>(scene_.start.positions.data(), static_cast<Eigen::Index>(scene_.start.positions.size())),
+                 Eigen::Map<const VectorXd>(scene_.start.velocities.data(), static_cast<Eigen::Index>(scene_.start.velocities.size())));
+    return result;
+  }
+
+  /// What rows weigh and what pulls at them: gains are chosen by it.
+  void measure() {
+    const reference::PlainScene scene = plain();
+    inertia_ = scene.row_inertia();
+    load_ = (inertia_.array() * scene.acceleration().array().abs()).matrix();
+    for (Index row = 0; row < load_.size(); ++row) load_[row] = std::max(load_[row], 0.3 * inertia_[row]);
+  }
+  double inertia(Index row) const { return inertia_[row]; }
+  double load(Index row) const { return load_[row]; }
+
+  void make_effects() {
+    Effects& effects = scene_.effects;
+    if (chance(0.2)) {
+      const double share = spread(0.02, 2);
+      each_screw([&](Index, Index row) { effects.armature.push_back({row, share * inertia(row)}); });
+      if (!effects.armature.empty()) measure();
+    }
+    if (wants(0.15, kind_ == swing && chance(0.4))) {
+      each_screw([&](Index slot, Index row) {
+        const double w = rate();
+        if (chance(0.7)) effects.springs.push_back({row, inertia(row) * w * w, position_of(slot) + swing_of(slot, w)});
+      });
+      for (Index i = 1; i < model().tree.shape.slots; ++i) {
+        if (model().tree.kind(i) != JointKind::ball) continue;
+        const double w = rate();
+        const double* now = &scene_.start.positions[static_cast<std::size_t>(model().tree.first_q(i))];
+        const Eigen::Quaterniond rest =
+            Eigen::Quaterniond(now[3], now[0], now[1], now[2]) *
+            Eigen::AngleAxisd(std::min(1.0, 5 / w) * random_.uniform(0, 1), random_.rotation() * Vector3d::UnitZ());
+        effects.ball_springs.push_back({i, inertia(model().tree.first_v(i)) * w * w, {rest.x(), rest.y(), rest.z(), rest.w()}});
+      }
+    }
+    if (wants(0.2, kind_ == settle)) {
+      const double r = kind_ == settle ? std::min(spread(0.03, 0.3) / h_, 1e4) : rate();
+      for (const JointDamping& damper : damping_everywhere(model(), 1)) {
+        effects.damping.push_back({damper.row, r * inertia(damper.row) * random_.uniform(0.5, 1)});
+      }
+    }
+    if (wants(0.12, kind_ == servo)) make_servos();
+    if (wants(0.12, kind_ == friction)) {
+      const double share = spread(0.1, 4);
+      each_screw([&](Index, Index row) {
+        if (chance(0.8)) effects.friction.push_back({row, share * load(row) * random_.uniform(0.5, 1)});
+      });
+    }
+    if (wants(0.08, kind_ == limits)) make_limits();
+    if (wants(0.08, kind_ == push)) make_pushes();
+    if (wants(0.08, kind_ == torque)) make_torques();
+    if (wants(0.08, kind_ == drag)) make_drag();
+    if (on_ground()) make_ground();
+  }
+
+  void make_servos() {
+    const bool limited = chance(0.4), stays = chance(0.3), moves = chance(0.25);
+    each_screw([&](Index slot, Index row) {
+      const double w = rate(), at = position_of(slot);
+      const double damping = std::min(2 * w * spread(0.1, 2), (scene_.stiff ? 4 : 0.5) / h_);
+      scene_.effects.servos.push_back({.row = row,
+                                       .stiffness = inertia(row) * w * w,
+                                       .damping = inertia(row) * damping,
+                                       .target = stays ? at : at + swing_of(slot, w),
+                                       .max_force = limited ? load(row) * spread(0.3, 5) : kInfinity});
+      if (moves) make_tables(scene_.effects.servos.back(), slot, w);
+    });
+    scene_.bends = scene_.bends || limited || moves;
+  }
+
+  /// Targets over time that end, with their speeds or with a force beside, or without.
+  void make_tables(Servo& servo, Index slot, double w) {
+    Course course{{}, {}}, speed{{}, {}};
+    double t = 0, at = servo.target;
+    const double stretch = h_ * spread(0.7, 8);
+    for (int k = 0; k < 12; ++k) {
+      const double next = k == 11 ? at : at + 0.2 * swing_of(slot, w);
+      course.times.push_back(t);
+      course.values.push_back(at);
+      // a speed that jumps where the target bends
+      speed.times.insert(speed.times.end(), {t, t + stretch});
+      speed.values.insert(speed.values.end(), 2, k == 11 ? 0 : (next - at) / stretch);
+      t += stretch;
+      at = next;
+    }
+    servo.target_over_time = course;
+    if (chance(0.5)) servo.target_velocity = speed;
+    if (chance(0.3)) servo.feedforward = {{0, t}, {either_way(load(servo.row)), 0}};
+  }
+
+  void make_limits() {
+    const std::array<double, 4> shares{0, 0.5, 1, random_.uniform(0, 1)};
+    const double restitution = shares[random_.below(4)];
+    each_screw([&](Index slot, Index row) {
+      const auto at = static_cast<std::size_t>(row);
+      const double q = position_of(slot);
+      double& v = scene_.start.velocities[at];
+      if (chance(0.25)) return;
+      // on the limit, within a step of it, or some steps away and moving towards it
+      if (v == 0 && chance(0.6)) v = either_way(slides(slot) ? 0.3 : 2);
+      const double away = std::abs(v) * h_ * (chance(0.15) ? 0 : chance(0.2) ? random_.uniform(0, 1) : random_.uniform(1, 12));
+      const double room = spread(0.05, 1);
+      JointLimit limit{.row = row, .lower = q - room, .upper = q + room, .restitution = restitution};
+      (v < 0 ? limit.lower : limit.upper) = v < 0 ? q - away : q + away;
+      if (chance(0.3)) (v < 0 ? limit.upper : limit.lower) = v < 0 ? kInfinity : -kInfinity;
+      if (chance(0.2)) limit.velocity = std::max(std::abs(v), slides(slot) ? 0.05 : 0.3) * random_.uniform(1, 2);
+      scene_.effects.limits.push_back(limit);
+    });
+  }
+
+  /// Times within the steps, or on them.
+  double moment(double low, double high) {
+    const double t = random_.uniform(low, high);
+    return h_ * (chance(0.4) ? std::floor(t) : t);
+  }
+
+  void make_pushes() {
+    scene_.bends = true;
+    const auto count = 1 + random_.below(2);
+    for (std::uint64_t k = 0; k < count; ++k) {
+      BodyWrench wrench;
+      do {
+        wrench.slot = static_cast<Index>(1 + random_.below(static_cast<std::uint64_t>(model().tree.bodies())));
+      } while (!(model().constants.inertia(wrench.slot, 0) > 0));
+      const double mass = model().constants.inertia(wrench.slot, 0), steps = chance(0.3) ? random_.uniform(0.1, 1) : random_.uniform(1, 6);
+      wrench.from = moment(0, 10);
+      wrench.to = chance(0.4) ? wrench.from + h_ * std::ceil(steps) : wrench.from + h_ * steps;
+      const double force = mass * spread(0.05, 1) / (wrench.to - wrench.from);
+      const Vector3d way = random_.rotation() * Vector3d::UnitZ();
+      for (std::size_t axis = 0; axis < 3; ++axis) wrench.force[axis] = force * way[static_cast<Eigen::Index>(axis)];
+      if (chance(0.3)) wrench.moment = {0, 0, 0.02 * force};
+      wrench.point = {either_way(0.05), either_way(0.05), 0};
+      wrench.in_world = chance(0.7);
+      scene_.effects.wrenches.push_back(wrench);
+    }
+    std::ranges::sort(scene_.effects.wrenches, {}, &BodyWrench::slot);
+  }
+
+  void make_torques() {
+    each_screw([&](Index, Index row) {
+      if (chance(0.3)) return;
+      Course course{{}, {}};
+      const double most = load(row) * spread(0.3, 5);
+      const int shape = static_cast<int>(random_.below(3));
+      double t = 0;
+      for (int k = 0; k < 40; ++k) {
+        const double value = either_way(most);
+        course.times.push_back(t);
+        course.values.push_back(value);
+        // held for a step and then jumping; straight from step to step; bent anywhere
+        t += shape == 2 ? h_ * random_.uniform(0.2, 3) : h_;
+        if (shape == 0) {
+          course.times.push_back(t);
+          course.values.push_back(value);
+        }
+      }
+      if (chance(0.5)) course.values.back() = 0;
+      if (shape != 1) scene_.bends = true;
+      scene_.effects.torques.push_back({row, course});
+    });
+    scene_.bends = scene_.bends || !scene_.effects.torques.empty();
+  }
+
+  void make_drag() {
+    for (Index i = 1; i < model().tree.shape.slots; ++i) {
+      const double mass = model().constants.inertia(i, 0);
+      if (!(mass > 0) || chance(0.3)) continue;
+      const double r = std::min(rate(), 0.3 / h_);
+      scene_.effects.drag.push_back({.slot = i, .linear = chance(0.7) ? mass * r : 0, .quadratic = chance(0.5) ? mass * std::min(r, 3.0) : 0});
+    }
+    if (chance(0.4)) scene_.effects.wind = {either_way(5), either_way(5), 0};
+  }
+
+  void make_ground() {
+    Ground ground;
+    std::vector<std::string> notes;
+    ground.contacts = contacts_of(model(), notes);
+    const reference::PlainScene scene = plain();
+    double mass = 0;
+    for (Index i = 1; i < model().tree.shape.slots; ++i) mass += model().constants.inertia(i, 0);
+    const double w = spread(0.1, scene_.stiff ? 4 : 0.5) / h_, points = kind_ == rest_on_ground ? 4 : 1;
+    ground.stiffness = std::min(mass * w * w / points, 1e7);
+    ground.damping = chance(0.3) ? 0 : 2 * spread(0.02, 1) * std::sqrt(ground.stiffness * mass / points);
+    ground.friction = chance(0.1) ? 0 : random_.uniform(0.1, 1);
+    scene_.effects.ground = ground;
+    // the ground comes up to the lowest point
+    const reference::PlainTree& tree = scene.tree();
+    const reference::PlainForces forces(tree, scene_.effects, scene_.options.gravity);
+    double lowest = kInfinity;
+    for (const auto& contact : forces.contacts(reference::body_motions(tree, scene.q, scene.v))) lowest = std::min(lowest, contact.gap);
+    double fall = 0;
+    if (kind_ == drop) {
+      const double down = spread(0.05, 2);
+      fall = down * h_ * random_.uniform(1, 10);
+      for (Index i = 1; i < model().tree.shape.slots; ++i) {
+        if (model().tree.kind(i) != JointKind::free) continue;
+        const Vector3d in_body =
+            reference::plain_joint_pose(tree.body(i), scene.q).linear().transpose() * Vector3d(0, 0, -down);
+        for (int k = 0; k < 3; ++k) scene_.start.velocities[static_cast<std::size_t>(model().tree.first_v(i) + 3 + k)] += in_body[k];
+      }
+    } else if (chance(0.5)) {
+      fall = -mass * 9.81 / (ground.stiffness * points);
+    }
+    scene_.effects.ground->height = lowest - fall;
+  }
+
+  /// To the end of the motion, for what has one; a long look now and then.
+  void choose_length() {
+    const bool ends = kind_ == settle || kind_ == servo || kind_ == friction || kind_ == rest_on_ground;
+    double steps = ends ? spread(300, 1500) : spread(60, 600);
+    steps = std::min(steps, 6000.0 / static_cast<double>(model().tree.bodies()));
+    if (chance(0.02)) steps *= 10;
+    scene_.steps = std::max<std::int64_t>(scene_.horizon, static_cast<std::int64_t>(steps));
+  }
+
+  Random random_;
+  EverydayScene scene_;
+  Kind kind_ = swing;
+  double h_ = 1e-3;
+  VectorXd inertia_, load_;
+  std::set<Index> followers_;
+};
+
+}  // namespace
+
+EverydayScene everyday_scene(std::uint64_t seed, std::uint64_t number) { return Maker(seed, number).make(); }
+
+std::string EverydayScene::text() const {
+  std::string acts;
+  const auto name = [&](bool there, const char* what) {
+    if (there) acts += (acts.empty() ? "" : ", ") + std::string(what);
+  };
+  name(options.gravity != std::array<double, 3>{0, 0, 0}, "gravity");
+  name(!effects.armature.empty(), "armature");
+  name(!effects.springs.empty() || !effects.ball_springs.empty(), "springs");
+  name(!effects.damping.empty(), "damping");
+  name(!effects.servos.empty(), "servos");
+  name(!effects.friction.empty(), "friction");
+  name(!effects.limits.empty(), "limits");
+  name(!effects.wrenches.empty(), "wrenches");
+  name(!effects.torques.empty(), "torques");
+  name(!effects.drag.empty(), "drag");
+  name(effects.ground.has_value(), "ground");
+  const bool floats = model->tree.shape.slots > 1 && model->tree.kind(1) == JointKind::free;
+  return fmt::format("{}{}, {} {}{}, {} base, h = {:.3g} ms, {} steps; {}", stiff ? "stiff " : "", kind, model->tree.bodies(),
+                     model->tree.bodies() == 1 ? "body" : "bodies", model->mimics.empty() ? "" : ", ties", floats ? "floating" : "fixed",
+                     1e3 * options.step, steps, acts.empty() ? "nothing acts" : acts);
+}
+
+}  // namespace linden

@@ -1,0 +1,315 @@
+// tests/reference/plain_scene.hpp
+// A plain simulator of whole scenes: minimal coordinates, dense matrices, tiny steps. The judge of the engine, which shares nothing with
+// it but the model and the values of the effects.
+//
+//   coordinates  u of those rows that follow no other, v = Z u               q' = rates of quaternions and places
+//   smooth       Z^T M Z u' = Z^T (Q - bias)                                  Runge and Kutta's method of order 4
+//   sudden       A (u+ - u) = dt Z^T (Q - bias - dt K v) + W^T lambda         A = Z^T (M + dt C + dt^2 K) Z, first order
+//                rows of plain_forces.hpp, D = W A^-1 W^T dense, by projected Gauss and Seidel
+//
+// A step in which nothing sudden may act is one of the first kind, so limits and ground cost no order before they are met. Forces that
+// jump in time do so between steps: a step never reaches across a time at which one begins, ends or bends.
+//
+// source  Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); Anitescu, Potra, Formulating dynamic multi-rigid-
+//         body contact problems with friction as solvable linear complementarity problems (1997); Hairer, Norsett, Wanner, Solving
+//         Ordinary Differential Equations I, II.1
+#pragma once
+
+#include <memory>
+
+#include "tests/reference/plain_forces.hpp"
+
+namespace linden::reference {
+
+class PlainScene {
+ public:
+  /// At rest in the zero configuration. Model and effects are copied as far as they are needed.
+  PlainScene(const Model& model, const Effects& effects, const std::array<double, 3>& gravity)
+      : fixed_(std::make_shared<const Fixed>(model, effects, gravity)),
+        v(VectorXd::Zero(model.tree.shape.velocities)),
+        sudden(VectorXd::Zero(model.tree.shape.velocities)) {
+    const std::vector<double> neutral = model.neutral();
+    q = Eigen::Map<const VectorXd>(neutral.data(), static_cast<Eigen::Index>(neutral.size()));
+  }
+
+  const PlainTree& tree() const { return fixed_->tree; }
+
+  /// Followers follow.
+  void start(const VectorXd& positions, const VectorXd& velocities) {
+    q = positions;
+    v = velocities;
+    for (const Mimic& mimic : fixed_->mimics) {
+      q[mimic.follower_q] = mimic.multiplier * q[mimic.leader_q] + mimic.offset;
+      v[mimic.follower_v] = mimic.multiplier * v[mimic.leader_v];
+    }
+  }
+
+  /// On by `duration`, in so many steps or a few more.
+  void advance(double duration, int steps) {
+    const double begin = time, end = time + duration, longest = duration / steps;
+    std::vector<double> stops{begin};
+    for (const double stop : fixed_->breaks) {
+      if (stop > begin + 1e-9 * longest && stop < end - 1e-9 * longest) stops.push_back(stop);
+    }
+    stops.push_back(end);
+    for (std::size_t piece = 0; piece + 1 < stops.size(); ++piece) {
+      const double length = stops[piece + 1] - stops[piece];
+      const int count = std::max(1, static_cast<int>(std::ceil(length / longest - 1e-6)));
+      for (int k = 0; k < count; ++k) step(stops[piece] + k * length / count, length / count);
+    }
+    time = end;
+  }
+
+  /// M with rotors, of all rows as if none followed another.
+  MatrixXd mass_matrix() const { return mass_matrix_at(body_motions(tree(), q, v)); }
+
+  /// v' of the smooth forces.
+  VectorXd acceleration() const { return acceleration_at(q, v, time, {time, time}); }
+
+  /// What each row's velocity weighs where all others are free to move [kg m^2, kg].
+  VectorXd row_inertia() const {
+    const MatrixXd M = fixed_->Z.transpose() * mass_matrix() * fixed_->Z;
+    return (fixed_->Z * M.ldlt().solve(fixed_->Z.transpose())).diagonal().cwiseInverse();
+  }
+
+  /// Stiffest of the joints' own rates [1/s]: roots of stiffness, and damping, over inertia.
+  double stiffest_rate() const {
+    VectorXd c, k;
+    fixed_->forces.joint_gains(c, k);
+    for (const Servo& servo : fixed_->effects.servos) {
+      if (!std::isfinite(servo.max_force)) continue;
+      c[servo.row] += servo.damping;
+      k[servo.row] += servo.stiffness;
+    }
+    const VectorXd inertia = row_inertia();
+    return std::max(k.cwiseQuotient(inertia).cwiseSqrt().maxCoeff(), c.cwiseQuotient(inertia).maxCoeff());
+  }
+
+  /// Kinetic energy and potential of gravity, springs and ground [J].
+  double energy() const {
+    double sum = 0.5 * v.dot(mass_matrix() * v);
+    const std::vector<BodyMotion> motions = body_motions(tree(), q, v);
+    for (Index i = 1; i < tree().slots(); ++i) {
+      const PlainBody& body = tree().body(i);
+      sum -= body.mass() * fixed_->gravity.dot(motions[static_cast<std::size_t>(i)].world(center_of(body)));
+    }
+    const auto half_square = [](double k, double x) { return 0.5 * k * x * x; };
+    for (const JointSpring& spring : fixed_->effects.springs) {
+      sum += half_square(spring.stiffness, fixed_->forces.position(q, spring.row) - spring.rest);
+    }
+    for (const BallSpring& spring : fixed_->effects.ball_springs) {
+      if (spring.stiffness > 0) {
+        const Vector3d torque = ball_spring_torque(spring, q.segment<4>(tree().body(spring.slot).q));
+        sum += half_square(1 / spring.stiffness, torque.norm());
+      }
+    }
+    for (const PlainContact& contact : fixed_->forces.contacts(motions)) {
+      sum += half_square(fixed_->effects.ground->stiffness, std::min(contact.gap, 0.0));
+    }
+    return sum;
+  }
+
+ private:
+  struct Fixed {
+    Fixed(const Model& model, const Effects& given, const std::array<double, 3>& g)
+        : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g) {
+      std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.velocities), nullptr);
+      for (const Mimic& mimic : mimics) follows[static_cast<std::size_t>(mimic.follower_v)] = &mimic;
+      Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom());
+      Index column = 0;
+      for (Index row = 0; row < tree.velocities; ++row) {
+        if (follows[static_cast<std::size_t>(row)] == nullptr) Z(row, column++) = 1;
+      }
+      for (const Mimic& mimic : mimics) Z.row(mimic.follower_v) = mimic.multiplier * Z.row(mimic.leader_v);
+      const auto bends = [&](const Course& course) { breaks.insert(breaks.end(), course.times.begin(), course.times.end()); };
+      for (const JointTorque& torque : effects.torques) bends(torque.force);
+      for (const Servo& servo : effects.servos) {
+        for (const Course* course : {&servo.target_over_time, &servo.target_velocity, &servo.feedforward}) bends(*course);
+      }
+      for (const BodyWrench& wrench : effects.wrenches) {
+        bends(wrench.scale);
+        for (const double edge : {wrench.from, wrench.to}) {
+          if (std::isfinite(edge)) breaks.push_back(edge);
+        }
+      }
+      std::ranges::sort(breaks);
+      breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
+    }
+    PlainTree tree;
+    Effects effects;
+    std::vector<Mimic> mimics;
+    Vector3d gravity;
+    PlainForces forces;
+    MatrixXd Z;  // [nv x u]
+    std::vector<double> breaks;  // times at which a force jumps or bends [s]
+  };
+
+  /// Begin and end of a step: where a force jumps at one of them, it is that within that counts.
+  struct Within {
+    double begin, end;
+    double operator()(double t) const {
+      const double sliver = 1e-9 * (end - begin);
+      return std::clamp(t, begin + sliver, end - sliver);
+    }
+  };
+
+  MatrixXd mass_matrix_at(const std::vector<BodyMotion>& motions) const {
+    MatrixXd M = mass_matrix_of(tree(), motions);
+    for (const Armature& rotor : fixed_->effects.armature) M(rotor.row, rotor.row) += rotor.inertia;
+    return M;
+  }
+
+  VectorXd acceleration_at(const VectorXd& at, const VectorXd& rate, double t, const Within& within) const {
+    const std::vector<BodyMotion> motions = body_motions(tree(), at, rate);
+    const MatrixXd M = fixed_->Z.transpose() * mass_matrix_at(motions) * fixed_->Z;
+    const VectorXd force = fixed_->forces.force(at, rate, within(t), motions, true) - bias_force(tree(), motions);
+    return fixed_->Z * M.ldlt().solve(fixed_->Z.transpose() * force);
+  }
+
+  /// q' [nq].
+  VectorXd position_rate(const VectorXd& at, const VectorXd& rate) const {
+    VectorXd slope = VectorXd::Zero(at.size());
+    for (Index i = 1; i < tree().slots(); ++i) {
+      const PlainBody& body = tree().body(i);
+      if (body.kind == JointKind::screw) {
+        slope[body.q] = rate[body.v];
+        continue;
+      }
+      const Index turn = body.kind == JointKind::free ? body.q + 3 : body.q;
+      const Eigen::Quaterniond now(Eigen::Vector4d(at.segment<4>(turn)));
+      const Vector3d w = rate.segment<3>(body.v);
+      slope.segment<4>(turn) = 0.5 * (now * Eigen::Quaterniond(0, w.x(), w.y(), w.z())).coeffs();
+      if (body.kind == JointKind::free) {
+        slope.segment<3>(body.q) = rotation_matrix<double>(at.segment<4>(turn)) * rate.segment<3>(body.v + 3);
+      }
+    }
+    return slope;
+  }
+
+  VectorXd unit_quaternions(VectorXd at) const {
+    for (Index i = 1; i < tree().slots(); ++i) {
+      const PlainBody& body = tree().body(i);
+      if (body.kind != JointKind::screw) at.segment<4>(body.kind == JointKind::free ? body.q + 3 : body.q).normalize();
+    }
+    return at;
+  }
+
+  void step(double t, double dt) {
+    const Within within{t, t + dt};
+    const std::vector<BodyMotion> motions = body_motions(tree(), q, v);
+    if (!fixed_->forces.sudden(q, v, motions)) {
+      // order 4
+      VectorXd dq[4], dv[4];
+      for (int stage = 0; stage < 4; ++stage) {
+        const double share = stage == 0 ? 0 : stage == 3 ? 1 : 0.5;
+        const VectorXd at = stage == 0 ? q : VectorXd(q + share * dt * dq[stage - 1]);
+        const VectorXd rate = stage == 0 ? v : VectorXd(v + share * dt * dv[stage - 1]);
+        dq[stage] = position_rate(at, rate);
+        dv[stage] = acceleration_at(at, rate, t + share * dt, within);
+      }
+      const VectorXd ahead = unit_quaternions(q + dt / 6 * (dq[0] + 2 * dq[1] + 2 * dq[2] + dq[3]));
+      const VectorXd rate = v + dt / 6 * (dv[0] + 2 * dv[1] + 2 * dv[2] + dv[3]);
+      if (!fixed_->forces.sudden(ahead, rate, body_motions(tree(), ahead, rate))) {
+        q = ahead;
+        v = rate;
+        return;
+      }
+    }
+    sudden_step(within(t + 0.5 * dt), dt);
+  }
+
+  /// Velocities of free joints are those of the frame where the step begins, and seen from that where it ends only afterwards: what
+  /// touches the ground is held in one and the same frame all along.
+  void sudden_step(double t, double dt) {
+    const MatrixXd& Z = fixed_->Z;
+    const std::vector<BodyMotion> motions = body_motions(tree(), q, v, true);
+    VectorXd c, k;
+    fixed_->forces.joint_gains(c, k);
+    MatrixXd M = mass_matrix_at(motions);
+    M.diagonal() += dt * c + dt * dt * k;
+    const Eigen::LLT<MatrixXd> A(Z.transpose() * M * Z);
+    const VectorXd force = fixed_->forces.force(q, v, t, motions, false) - bias_force(tree(), motions) - dt * k.cwiseProduct(v);
+    VectorXd after = v + Z * A.solve(dt * (Z.transpose() * force));
+    const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, t, dt);
+    if (!rows.empty()) {
+      MatrixXd W(static_cast<Eigen::Index>(rows.size()), tree().velocities);
+      for (std::size_t r = 0; r < rows.size(); ++r) W.row(static_cast<Eigen::Index>(r)) = rows[r].J;
+      const MatrixXd response = Z * A.solve(Z.transpose() * W.transpose());
+      const VectorXd lambda = impulses(rows, W * response, W * after);
+      after += response * lambda;
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        const auto at = static_cast<Eigen::Index>(r);
+        if (rows[r].kind != RowKind::servo) sudden += (response.col(at) * lambda[at]).cwiseAbs();
+      }
+    }
+    move(0.5 * (v + after), after, dt);
+  }
+
+  /// Joints end where their limits were asked, with the velocity that they end with; what turns freely goes on by the mean of both.
+  void move(const VectorXd& mean, const VectorXd& after, double dt) {
+    v = after;
+    for (Index i = 1; i < tree().slots(); ++i) {
+      const PlainBody& body = tree().body(i);
+      if (body.kind == JointKind::screw) {
+        q[body.q] += dt * after[body.v];
+        continue;
+      }
+      const Index turn = body.kind == JointKind::free ? body.q + 3 : body.q;
+      const Eigen::Quaterniond before(Eigen::Vector4d(q.segment<4>(turn)));
+      const Eigen::Quaterniond moved(rotation_quaternion<double>(dt * mean.segment<3>(body.v)));
+      q.segment<4>(turn) = (before * moved).normalized().coeffs();
+      if (body.kind == JointKind::free) {
+        q.segment<3>(body.q) += dt * (before * Vector3d(mean.segment<3>(body.v + 3)));
+        v.segment<3>(body.v + 3) = moved.conjugate() * Vector3d(after.segment<3>(body.v + 3));
+      }
+    }
+  }
+
+  /// Projected Gauss and Seidel; pairs of tangents are kept within their circle together.
+  static VectorXd impulses(const std::vector<PlainRow>& rows, const MatrixXd& D, const VectorXd& free) {
+    constexpr int kMost = 1000;
+    constexpr double kEnough = 1e-13;  // of the largest velocity in question
+    const auto count = static_cast<Eigen::Index>(rows.size());
+    VectorXd lambda = VectorXd::Zero(count), speed = free;  // speed = free + D lambda
+    const auto change = [&](Eigen::Index r, double to) {
+      const double by = to - lambda[r];
+      if (by == 0) return 0.0;
+      speed += by * D.col(r);
+      lambda[r] = to;
+      return std::abs(by) * D(r, r);
+    };
+    const double scale = free.cwiseAbs().maxCoeff();
+    for (int sweep = 0; sweep < kMost; ++sweep) {
+      double most = 0;
+      for (Eigen::Index r = 0; r < count; ++r) {
+        const PlainRow& row = rows[static_cast<std::size_t>(r)];
+        if (row.kind == RowKind::tangent) {
+          // both tangents; the normal stands before them
+          const double d = std::max(D(r, r), D(r + 1, r + 1)), circle = row.friction * lambda[r - 1];
+          if (d > 0) {
+            Eigen::Vector2d to = lambda.segment<2>(r) - speed.segment<2>(r) / d;
+            if (to.norm() > circle) to *= circle / to.norm();
+            most = std::max({most, change(r, to[0]), change(r + 1, to[1])});
+          }
+          ++r;
+          continue;
+        }
+        const double d = D(r, r) + row.compliance;
+        if (!(d > 0)) continue;
+        const double miss = row.goal - speed[r] - row.compliance * lambda[r];
+        most = std::max(most, change(r, std::clamp(lambda[r] + miss / d, row.low, row.high)));
+      }
+      if (most <= kEnough * scale) break;
+    }
+    return lambda;
+  }
+
+  std::shared_ptr<const Fixed> fixed_;
+
+ public:
+  VectorXd q, v;     // [nq], [nv]
+  double time = 0;   // [s]
+  VectorXd sudden;   // [nv] changes of velocity that sudden rows gave so far, each with its size
+};
+
+}  // namespace linden::reference
