@@ -359,7 +359,8 @@ class EffectSweeps {
       const auto drag = into(work.drag, account.drag);
       for (Index k = 0; k < drags_.loss.rows(); ++k) drag(drags_.entries[static_cast<std::size_t>(k)].slot, drags_.loss(k));
       for (Index k = 0; k < wrenches_.work.rows(); ++k) work.wrench += wrenches_.work(k);
-      work.ground = -ground_work(plan_.ground, known, points_);
+      const auto ground = into(work.ground, account.ground);
+      ground_work(plan_.ground, known, points_, [&](Index slot, double given) { ground(slot, -given); });
     }
     return account;
   }

@@ -588,17 +588,15 @@ auto revise_ground(GroundPoints<S>& points, const Mask& settled, const S& least)
   return changed;
 }
 
-/// Work of the ground in the evaluation last made [J]. `known`: the last step is, rise_before and slip_last.
-template <class S>
-S ground_work(const GroundPlan& plan, bool known, const GroundPoints<S>& points) {
-  S sum(0.0);
+/// Work of the ground in the evaluation last made: each(slot, work [J]). `known`: the last step is, rise_before and slip_last.
+template <class S, class Each>
+void ground_work(const GroundPlan& plan, bool known, const GroundPoints<S>& points, const Each& each) {
   for (Index k = 0; k < points.push.rows(); ++k) {
     const S rise = points.rise(k), rise_before = known ? points.rise_before(k) : rise;
     const auto t = load<Vec3, S>(points.slip, k), t_before = known ? load<Vec3, S>(points.slip_last, k) : t;
-    sum = sum + points.push(k) * worked(plan.share[static_cast<std::size_t>(k)], rise, rise_before) +
-          S(0.5) * dot(load<Vec3, S>(points.drag, k), t + t_before);
+    each(plan.points[static_cast<std::size_t>(k)].slot, points.push(k) * worked(plan.share[static_cast<std::size_t>(k)], rise, rise_before) +
+                                                            S(0.5) * dot(load<Vec3, S>(points.drag, k), t + t_before));
   }
-  return sum;
 }
 
 /// At the end of a step.

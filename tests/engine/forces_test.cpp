@@ -308,7 +308,7 @@ TEST_CASE("a joint goes no faster than its limit of velocity, and what that take
       // from rest at constant acceleration, then at constant velocity
       const double exact = 0.5 * kMost * kReached + kMost * (simulation.time() - kReached);
       CHECK(simulation.positions()[0] == Approx(way * exact).margin(kMost * h));
-      const EffectWork<double>& work = simulation.effect_work();
+      const EffectWork& work = simulation.effect_work();
       CHECK(work.torque == Approx(kTorque * std::abs(simulation.positions()[0])).epsilon(1e-12));
       CHECK(work.limits == Approx(work.torque - 0.5 * kInertia * kMost * kMost).margin(kTorque * kMost * h));
     }

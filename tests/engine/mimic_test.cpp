@@ -80,7 +80,7 @@ void check_against_twin(const Make& effects, double speed, int steps) {
       CHECK(pair.positions()[static_cast<std::size_t>(follower)] ==
             slides.multiplier * pair.positions()[static_cast<std::size_t>(leader)] + slides.offset);
       worst = std::max(worst, std::abs(pair.velocities()[static_cast<std::size_t>(leader)] - twin.velocities()[0]));
-      const EffectWork<double>&a = pair.effect_work(), &b = twin.effect_work();
+      const EffectWork&a = pair.effect_work(), &b = twin.effect_work();
       for (const double more : {pair.energy().total() - twin.energy().total(), a.damping - b.damping, a.friction - b.friction,
                                 a.limits - b.limits, a.servo - b.servo, a.torque - b.torque}) {
         worst = std::max(worst, std::abs(more) / slides.inertia());

@@ -106,7 +106,7 @@ void check_batches(const EverydayScene& scene, Differences& found) {
 
 Told told(Simulation& simulation) {
   const Energy energy = simulation.energy();
-  const EffectWork<double>& work = simulation.effect_work();
+  const EffectWork& work = simulation.effect_work();
   return {numbers(simulation.positions()), numbers(simulation.momenta()), simulation.velocities(),
           {energy.kinetic, energy.potential, work.taken(), work.given()}, {}};
 }

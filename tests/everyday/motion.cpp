@@ -248,7 +248,7 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
                           "{:.3g} J)",
                           at(scene, where), walk.nodes[where].balance() - first, allowed, scale));
   }
-  const auto gives = [&](const char* effect, double EffectWork<double>::* taken, bool there) {
+  const auto gives = [&](const char* effect, double EffectWork::* taken, bool there) {
     if (!there) return;
     double peak = 0, drop = 0;
     std::size_t place = 0;
@@ -266,11 +266,11 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
                             allowed, scale));
     }
   };
-  gives("damping", &EffectWork<double>::damping, !scene.effects.damping.empty());
-  gives("friction", &EffectWork<double>::friction, !scene.effects.friction.empty());
-  gives("a limit", &EffectWork<double>::limits, !scene.effects.limits.empty());
-  gives("drag", &EffectWork<double>::drag, !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
-  gives("ground", &EffectWork<double>::ground, scene.effects.ground.has_value());
+  gives("damping", &EffectWork::damping, !scene.effects.damping.empty());
+  gives("friction", &EffectWork::friction, !scene.effects.friction.empty());
+  gives("a limit", &EffectWork::limits, !scene.effects.limits.empty());
+  gives("drag", &EffectWork::drag, !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
+  gives("ground", &EffectWork::ground, scene.effects.ground.has_value());
 }
 
 namespace {

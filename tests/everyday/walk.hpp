@@ -26,7 +26,7 @@ Eigen::VectorXd vector_of(std::span<const double> numbers);
 struct Node {
   Eigen::VectorXd q, v;
   Energy energy;
-  EffectWork<double> work;
+  EffectWork work;
   double balance() const { return energy.total() + work.taken() - work.given(); }
 };
 
