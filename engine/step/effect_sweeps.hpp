@@ -211,7 +211,7 @@ class EffectSweeps {
   auto revise(const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
     using std::max;
     auto changed = S(0.0) > S(1.0);
-    if (soft()) return revise_limits(limits_, residual, settled, delta);
+    if (soft()) return revise_limits(limits_, residual, settled, one_by_one, delta);
     S least(0.0);
     if (any(one_by_one)) {
       const S overload = max(friction_overload(frictions_, h_, residual), ground_overload(points_));
@@ -220,7 +220,7 @@ class EffectSweeps {
     if (plan_.joints) {
       changed = revise_servos(servos_, plan_.q_row, h_, *q_, delta);
       changed = revise_friction(frictions_, h_, residual, settled, least, delta) || changed;
-      changed = revise_limits(limits_, residual, settled, delta) || changed;
+      changed = revise_limits(limits_, residual, settled, one_by_one, delta) || changed;
       if (any(changed)) assemble();
     }
     if (!plan_.ground.points.empty()) changed = revise_ground(points_, settled, least) || changed;
@@ -403,7 +403,7 @@ class EffectSweeps {
     on(!effects.servos.empty(), "revise_servos", [=, this, &q, &work] { revise_servos(servos_, plan_.q_row, h_, q, work.delta); });
     on(!effects.friction.empty(), "revise_friction",
        [=, this, &work] { revise_friction(frictions_, h_, work.innovation, true, S(0.0), work.delta); });
-    on(!effects.limits.empty(), "revise_limits", [=, this, &work] { revise_limits(limits_, work.innovation, true, work.delta); });
+    on(!effects.limits.empty(), "revise_limits", [=, this, &work] { revise_limits(limits_, work.innovation, true, false, work.delta); });
     on(points, "revise_ground", [=, this] { revise_ground(points_, true, S(0.0)); });
     on(plan_.joints, "joint_impulses_end_map", [=, this, &work, &end] { joint_impulses_end_map(sum_, h_, work.delta, end); });
     on(plan_.bodies, "add_given_up", [=, this, &work] { add_given_up(tree_, work.placement, bodies_.given, work.impulse); });

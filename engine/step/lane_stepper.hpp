@@ -330,10 +330,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
       const Pack scale = now.energy + fall;
       Lanes ok = usable & L::bits(number(0.5) * norm <= tolerance_squared_ * scale);
       ok |= usable & ~ok & at_rounding_floor(norm, now.energy);
-      const Lanes settled = ok | (usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale));
+      const bool bulk = corrections < kBulkEffectCorrections;
+      // what does not settle soon is judged at the solution: nearby, what holds a light joint is lost in what the others still lack
+      const Lanes settled = ok | (bulk ? usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale) : 0);
       Lanes changed = 0;
       if (effects_->plan().revises) {
-        const Mask one_by_one = corrections >= kBulkEffectCorrections ? L::mask(~Lanes{0}) : L::mask(0);
+        const Mask one_by_one = bulk ? L::mask(0) : L::mask(~Lanes{0});
         changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
       }
       ok &= active & ~changed;

@@ -449,7 +449,9 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
       return end(StepStatus::not_finite);
     }
     const bool done = at_floor || converged(now, norm, h);
-    if (revised(done || 0.5 * norm <= kSettled * kSettled * now.scale)) {
+    // what does not settle soon is judged at the solution: nearby, what holds a light joint is lost in what the others still lack
+    const bool near = revisions < kBulkRevisions && 0.5 * norm <= kSettled * kSettled * now.scale;
+    if (revised(done || near)) {
       at_floor = false;
       continue;
     }

@@ -86,19 +86,22 @@ void hold_limits(const Limits<S>& limits, JointImpulses<S>& sum) {
   }
 }
 
-/// As revise_friction: joints that pass a limit are put on it; where `settled`, those that it would have to pull are let go.
+/// As revise_friction: joints that pass a limit are put on it; where `settled`, those that it would have to pull are let go. All at once
+/// is quick but may go round in circles; `one_by_one` the last of the settled alone changes, which never does (Murty's rule: Note on a
+/// Bard-type scheme for solving the complementarity problem (1974)).
 template <class S, class Mask>
-auto revise_limits(Limits<S>& limits, const Field<S>& residual, const Mask& settled, Field<S>& delta) {
+auto revise_limits(Limits<S>& limits, const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
   const S zero(0.0), one(1.0);
   auto changed = zero > one;
-  for (Index k = 0; k < limits.mode.rows(); ++k) {
+  for (Index k = limits.mode.rows() - 1; k >= 0; --k) {
     const Index row = limits.entries[static_cast<std::size_t>(k)].row;
     S& d = delta(row);
     const S& mode = limits.mode(k);
     const auto open = mode == zero;
     // a residual above zero is taken away by a smaller delta: the joint leaves an upper limit by itself
-    const auto leaves = !open && settled && mode * residual(row) > zero;
-    const auto above = open && d > limits.highest(k), below = open && d < limits.lowest(k);
+    const auto may = !(one_by_one && (changed || !settled));
+    const auto leaves = may && !open && settled && mode * residual(row) > zero;
+    const auto above = may && open && d > limits.highest(k), below = may && open && d < limits.lowest(k);
     d = select(above, limits.highest(k), select(below, limits.lowest(k), d));
     changed = changed || leaves || above || below;
     limits.mode(k) = select(leaves, zero, select(above, one, select(below, -one, mode)));

@@ -382,6 +382,56 @@ TEST_CASE("every joint of a falling chain keeps to its limit of velocity, and th
   CHECK(balance(simulation) == Approx(before).margin(0.01 * taken));
 }
 
+TEST_CASE("a follower's limit of velocity holds its leader", "[forces][limits]") {
+  const Model hand = load_urdf(model_file("hand.urdf"), Base::fixed);
+  REQUIRE_FALSE(hand.mimics.empty());
+  const Mimic& mimic = hand.mimics.front();
+  constexpr double kMost = 0.5;
+  Effects effects;
+  effects.limits = on_leaders(hand, {JointLimit{.row = mimic.follower_v, .velocity = kMost}});
+  effects.torques = {{.row = mimic.leader_v, .force = {{0}, {1e-3}}}};
+  Simulation simulation(hand, still(), effects);
+  const auto position = [&] { return simulation.positions()[static_cast<std::size_t>(mimic.follower_q)]; };
+  double last = position(), fastest = 0;
+  for (int step = 0; step < 300; ++step) {
+    run(simulation, 1);
+    fastest = std::max(fastest, std::abs(position() - last) / 1e-3);
+    last = position();
+  }
+  CHECK(fastest == Approx(kMost).epsilon(1e-9));
+}
+
+TEST_CASE("a humanoid that starts with its joints at and beyond all their limits at once finds out which of them hold", "[forces][limits]") {
+  const std::shared_ptr<const Model> humanoid = std::make_shared<const Model>(load_urdf(model_file("humanoid.urdf"), Base::floating));
+  for (const double velocity : {0.0, 0.5, 0.1}) {
+    Effects effects;
+    effects.limits = urdf_limits(*humanoid);
+    if (velocity > 0) {
+      for (JointLimit& limit : effects.limits) limit.velocity = velocity;
+    }
+    Simulation simulation(humanoid, still(), effects);
+    Batch batch(humanoid, 40, batch_options(still()), effects);
+    batch.reset_all([&](std::int64_t i, std::span<double> q, std::span<double> v) {
+      const InitialState start = random_state(*humanoid, static_cast<std::uint64_t>(i + 120), 1);
+      std::ranges::copy(start.positions, q.begin());
+      std::ranges::copy(start.velocities, v.begin());
+    });
+    batch.step(20);
+    CHECK(batch.summary().frozen == 0);
+    for (const std::uint64_t seed : {3, 4, 5, 29, 60, 139, 143, 1059}) {
+      random_start(simulation, seed, 1);
+      const double energy = simulation.energy().total();
+      for (int step = 0; step < 30; ++step) {
+        INFO("velocity " << velocity << ", seed " << seed << ", step " << step);
+        const StepReport report = simulation.step();
+        REQUIRE(report.ok());
+        CHECK(report.substeps == 1);
+      }
+      CHECK(simulation.energy().total() < energy * (1 + 1e-9));
+    }
+  }
+}
+
 TEST_CASE("forces over time and limits of velocity move an instance of a batch as a simulation, in any parts and company",
           "[forces][batch]") {
   const std::shared_ptr<const Model> model = std::make_shared<const Model>(chain(4));

@@ -237,13 +237,13 @@ TEST_CASE("a limit stops a joint where it is, and lets go of one that is pulled 
   hold_limits(stopped, row.sum);
   CHECK(std::isinf(row.sum.stiffness(kRow)));
   residual(kRow) = -1;  // pushed on
-  CHECK_FALSE(revise_limits(stopped, residual, true, row.delta));
+  CHECK_FALSE(revise_limits(stopped, residual, true, false, row.delta));
   residual(kRow) = 1;  // pulled back
-  CHECK_FALSE(revise_limits(stopped, residual, false, row.delta));
-  CHECK(revise_limits(stopped, residual, true, row.delta));
+  CHECK_FALSE(revise_limits(stopped, residual, false, false, row.delta));
+  CHECK(revise_limits(stopped, residual, true, false, row.delta));
   CHECK(stopped.mode(0) == 0);
   row.delta(kRow) = 0.5;
-  CHECK(revise_limits(stopped, residual, true, row.delta));
+  CHECK(revise_limits(stopped, residual, true, false, row.delta));
   CHECK(row.delta(kRow) == Approx(0.01).epsilon(1e-12));
 }
 
@@ -270,6 +270,27 @@ TEST_CASE("a joint that bounces passes a limit that it is not at yet, where the 
       before(kRow) = 1e-3;
     }
   }
+}
+
+TEST_CASE("of joints that are at the wrong states one alone changes where that is asked, once they are settled") {
+  const std::vector<JointLimit> entries{{.row = 0, .lower = -1, .upper = 1}, {.row = kRow, .lower = -1, .upper = 1}};
+  Limits<double> limits{entries, {}, {}, {}};
+  limits.lowest.allocate(2, -0.01);
+  limits.highest.allocate(2, 0.01);
+  limits.mode.allocate(2, 0.0);
+  JointRow<double> row(0.02);  // beyond
+  row.delta(0) = 0.01;         // held, and pulled away
+  limits.mode(0) = 1;
+  Field<double> residual;
+  residual.allocate(2, 1.0);
+  CHECK_FALSE(revise_limits(limits, residual, false, true, row.delta));
+  CHECK(revise_limits(limits, residual, true, true, row.delta));
+  CHECK((limits.mode(0) == 1 && limits.mode(1) == 1));
+  CHECK(row.delta(kRow) == 0.01);
+  residual(kRow) = -1;
+  CHECK(revise_limits(limits, residual, true, true, row.delta));
+  CHECK((limits.mode(0) == 0 && limits.mode(1) == 1));
+  CHECK_FALSE(revise_limits(limits, residual, true, true, row.delta));
 }
 
 TEST_CASE("a limit of velocity leaves a joint its reach within a step, and less where a limit of position is nearer") {
