@@ -54,7 +54,7 @@ struct OnSlope {
     const double sag = 2 * kG * std::cos(slope) / (1e4 * static_cast<double>(resting(shape)));
     place = numbers({0, 0, half - sag, 0, 0, 0, 1});
   }
-  static int resting(const LinkShape& shape) { return shape.shape.kind == ShapeKind::box ? 4 : 1; }
+  static int resting(const LinkShape& shape) { return shape.shape.kind == ShapeKind::box ? 4 : shape.shape.kind == ShapeKind::cylinder ? 2 : 1; }
   /// Way along the slope after a second from rest.
   double way(int steps) const {
     PlainScene scene(model, effects, gravity);
@@ -248,6 +248,16 @@ TEST_CASE("a ball rolls down the plain simulator's ground as solid balls do", "[
   const double slope = 0.3, r = 0.1, solid = 0.4 * 2 * r * r;
   const OnSlope rolls(sphere(r), r, solid, slope, 0.5);
   CHECK(rolls.way(2000) == Approx(0.5 * kG * std::sin(slope) / 1.4).epsilon(0.002));
+}
+
+TEST_CASE("a cylinder rolls down the plain simulator's ground as solid cylinders do", "[plain]") {
+  const double slope = 0.3, r = 0.1;
+  LinkShape cylinder;
+  cylinder.pose.linear() = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  cylinder.shape.kind = ShapeKind::cylinder;
+  cylinder.shape.size = {r, 0.2, 0};
+  const OnSlope rolls(cylinder, r, 0.5 * 2 * r * r, slope, 0.5);
+  CHECK(rolls.way(2000) == Approx(0.5 * kG * std::sin(slope) / 1.5).epsilon(0.002));
 }
 
 TEST_CASE("a ball dropped on the plain simulator's ground comes back as high", "[plain]") {

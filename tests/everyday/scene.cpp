@@ -115,6 +115,12 @@ class Maker {
           ball.pose.translation() = center;
           ball.shape.kind = ShapeKind::sphere;
           ball.shape.size = {0.5 * width, 0, 0};
+          if (chance(0.4)) {
+            // a cylinder, lying or standing
+            ball.shape.kind = ShapeKind::cylinder;
+            ball.shape.size[1] = width * random_.uniform(0.2, 2);
+            if (chance(0.7)) ball.pose.linear() = Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitX()).toRotationMatrix();
+          }
           link.shapes = {ball};
         } else {
           link.shapes = {box_shape(size, center)};
@@ -148,7 +154,7 @@ class Maker {
     InitialState& start = scene_.start;
     start.positions = model().neutral();
     start.velocities.assign(static_cast<std::size_t>(model().tree.shape.velocities), 0.0);
-    const bool bent = chance(0.7), moves = kind_ == swing || kind_ == drag || (kind_ != rest_on_ground && chance(0.5));
+    const bool bent = chance(0.7), moves = kind_ == swing || kind_ == drag || chance(kind_ == rest_on_ground ? 0.3 : 0.5);
     const double fast = chance(0.1) ? 8 : 2;
     for (Index i = 1; i < model().tree.shape.slots; ++i) {
       const JointKind joint = model().tree.kind(i);
@@ -164,8 +170,8 @@ class Maker {
       double* quaternion = joint == JointKind::free ? q + 3 : q;
       if (bent && !flat) std::copy_n(turn.coeffs().data(), 4, quaternion);
       if (!moves) continue;
-      for (Index k = 0; k < 3; ++k) v[k] = either_way(flat ? 0 : fast);
-      for (Index k = 3; k < velocity_count(joint); ++k) v[k] = either_way(1);
+      for (Index k = 0; k < 3; ++k) v[k] = flat && k != 1 ? 0 : either_way(fast);
+      for (Index k = 3; k < velocity_count(joint); ++k) v[k] = flat && k == 5 ? 0 : either_way(1);
     }
   }
 

@@ -54,10 +54,10 @@ inline Vector3d ball_spring_torque(const BallSpring& spring, const Eigen::Vector
   return -spring.stiffness * rotation_vector<double>(off);
 }
 
-/// A place where a body touches the ground: its centre, and its lowest point now.
+/// A place where a body touches the ground, and that whose height its gap goes by: a ball's centre, or the place itself.
 struct PlainContact {
   Index slot;
-  Vector3d center, lowest;  // world
+  Vector3d gauge, place;  // world
   double gap;
 };
 
@@ -123,7 +123,8 @@ class PlainForces {
     }
   }
 
-  /// Over a plane; terrain and rims of cylinders are not in here.
+  /// Over a plane; terrain is not in here. A rim touches at its lowest place, and at those opposite and a quarter turn to either side, which
+  /// stay where they are in space while the rim turns: the last two as high as its centre.
   std::vector<PlainContact> contacts(const std::vector<BodyMotion>& motions) const {
     std::vector<PlainContact> result;
     if (!effects_->ground) return result;
@@ -131,6 +132,17 @@ class PlainForces {
     for (const ContactSphere& sphere : effects_->ground->contacts.spheres) {
       const Vector3d c = motions[static_cast<std::size_t>(sphere.slot)].world(vector_of(sphere.center));
       result.push_back({sphere.slot, c, c - sphere.radius * n, n.dot(c) - effects_->ground->height - sphere.radius});
+    }
+    for (const ContactRim& rim : effects_->ground->contacts.rims) {
+      const BodyMotion& motion = motions[static_cast<std::size_t>(rim.slot)];
+      const Vector3d c = motion.world(vector_of(rim.center)), axis = motion.R * vector_of(rim.axis), across = n - n.dot(axis) * axis;
+      const Vector3d down = across.norm() > 1e-9 ? Vector3d(-across.normalized()) : axis.unitOrthogonal();
+      const Vector3d beside = axis.cross(down);
+      for (const double way : {1.0, -1.0}) {
+        const Vector3d end = c + way * rim.radius * down;
+        result.push_back({rim.slot, end, end, n.dot(end) - effects_->ground->height});
+        result.push_back({rim.slot, c, c + way * rim.radius * beside, n.dot(c) - effects_->ground->height});
+      }
     }
     return result;
   }
@@ -174,7 +186,8 @@ class PlainForces {
     for (const JointLimit& limit : effects_->limits) {
       for (const int side : {0, 1}) {
         const double inward = side == 0 ? 1 : -1, gap = room(limit, side, q);
-        if (-inward * free[limit.row] > limit.velocity) rows.push_back({RowKind::limit, unit(limit.row, inward), 0, kInfinity, -limit.velocity});
+        // always, for what other rows may throw it to
+        if (std::isfinite(limit.velocity)) rows.push_back({RowKind::limit, unit(limit.row, inward), 0, kInfinity, -limit.velocity});
         if (gap + dt * std::min(inward * free[limit.row], inward * v[limit.row]) > 0) continue;
         const double back = -limit.restitution * inward * v[limit.row];
         rows.push_back({RowKind::limit, unit(limit.row, inward), 0, kInfinity, back > 0 ? back : -std::max(gap, 0.0) / dt});
@@ -185,9 +198,8 @@ class PlainForces {
       const Ground& ground = *effects_->ground;
       const Vector3d n = vector_of(ground.normal);
       const BodyMotion& motion = motions[static_cast<std::size_t>(contact.slot)];
-      const Rows3 J = motion.rows_at(contact.lowest);
-      // the gap moves with the shape: a sphere's as its centre does
-      const Eigen::RowVectorXd rise = n.transpose() * motion.rows_at(contact.center);
+      const Rows3 J = motion.rows_at(contact.place);
+      const Eigen::RowVectorXd rise = n.transpose() * motion.rows_at(contact.gauge);
       if (contact.gap + dt * std::min(rise.dot(free), rise.dot(v)) > 0) continue;
       const double g = (contact.gap <= 0 ? ground.damping : 0) + ground.stiffness * dt;
       rows.push_back({RowKind::normal, rise, 0, kInfinity, -ground.stiffness * contact.gap / g, 1 / (g * dt)});
