@@ -32,9 +32,7 @@ PassiveWatch::PassiveWatch(const Model& model, const Effects& effects)
     : model_(model), still_air_(effects.wind == std::array<double, 3>{0, 0, 0}) {}
 
 void PassiveWatch::add(const EffectAccount& step, double time) {
-#define LINDEN_DONE(name, sense) done_ += std::abs(step.work.name);
-  LINDEN_EFFECT_WORK(LINDEN_DONE)
-#undef LINDEN_DONE
+  done_ += step.work.magnitude();
   scale_ = std::max({scale_, step.kinetic, done_});
   for (std::size_t k = 0; k < kPassive.size(); ++k) {
     const Passive& passive = kPassive[k];

@@ -2,6 +2,8 @@
 // The account of a scene's effects.
 #pragma once
 
+#include <cmath>
+
 #include "layout/field.hpp"
 
 namespace linden {
@@ -26,6 +28,13 @@ struct EffectWork {
 #define LINDEN_ADD(name, sense) name += more.name;
     LINDEN_EFFECT_WORK(LINDEN_ADD)
 #undef LINDEN_ADD
+  }
+  double magnitude() const {
+    double sum = 0;
+#define LINDEN_MAGNITUDE(name, sense) sum += std::abs(name);
+    LINDEN_EFFECT_WORK(LINDEN_MAGNITUDE)
+#undef LINDEN_MAGNITUDE
+    return sum;
   }
   double given() const { return servo + torque + wrench; }
   double taken() const { return damping + friction + limits + drag + ground; }
