@@ -9,7 +9,7 @@
 //
 // Memory is [block][row][lane]: a block of W instances, W the lanes of the processor's registers, lies together, so that a thread takes it
 // through many steps without leaving its cache. Positions, momenta and one number more a degree of freedom and instance are all
-// that is kept; with effects three more, and one a contact point.
+// that is kept; with effects two more, and one a contact point.
 //
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
