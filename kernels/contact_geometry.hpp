@@ -5,6 +5,9 @@
 //   sphere, line or point  g = |y| - r            y = c - e without its part along the line
 //   circle, plane          g = n.c - o -+ rho s   s = |y|, y = n - (n.a) a: the lowest and the highest point of a disc
 //   circle, line           g = (|v| - rho) k      v from c to where the line pierces the plane of the circle
+//   line, line             g = w.(c - e) - r      w across both: an edge of a box, the axis of a cylinder or capsule
+//   line, point            g = |y| - r            y = c - e without its part along the body's line
+//   face, point            g = a.(c - e)          a into the body
 //
 // c centre, r radius of a sphere, a axis, rho radius of a circle. Features stand still; the body moves by D, its centre by D_c, and turns
 // by the rotation vector phi. All in the body frame at k. Wrenches are about the centre: moment, force.
@@ -123,6 +126,38 @@ LINDEN_INLINE GapChange<S> circle_over_line(const Vec3<S>& line, const Vec3<S>& 
   const CircleAndLine<S> begin(line, foot, axis), end(line, foot + moved, axis + turned_by(turn, axis));
   const S scale = S(1.0) / sqrt(dot(begin.gradient.f, begin.gradient.f));
   return {scale * (end.length - begin.length), (S(0.5) * scale) * (begin.gradient + end.gradient), scale * end.gradient};
+}
+
+/// How lines and faces of a body meet edges and corners.
+enum class BlockContact { crossing, corner_on_line, corner_on_face };
+
+/// Of a line or face of a body through c: its direction a, of a face the normal into the body.
+template <class S>
+struct BlockTouch {
+  S gap;
+  Vec3<S> normal;  // unit length
+  Vec3<S> arm;     // from c to where they touch, on the line or face
+
+  LINDEN_INLINE Wrench<S> gradient() const { return {cross(arm, normal), normal}; }
+};
+
+/// `along`: direction of the edge; `foot` = c - e; `toward`: the normal's side.
+template <class S>
+LINDEN_INLINE BlockTouch<S> touch_block(BlockContact contact, const Vec3<S>& a, const Vec3<S>& along, const Vec3<S>& foot, double radius,
+                                        const Vec3<S>& toward) {
+  using std::sqrt;
+  const S one(1.0), zero(0.0), tiny = as<S>(kFlat * kFlat);
+  if (contact == BlockContact::corner_on_face) return {dot(a, foot), a, -foot};
+  if (contact == BlockContact::corner_on_line) {
+    const S t = dot(a, foot);
+    const Vec3<S> y = foot - t * a;
+    const S length = sqrt(dot(y, y) + tiny);
+    return {length - as<S>(radius), (one / length) * y, -t * a};
+  }
+  const Vec3<S> across = cross(a, along);
+  const S sense = select(dot(across, toward) < zero, -one, one);
+  const Vec3<S> n = (sense / sqrt(dot(across, across) + tiny)) * across, between = cross(along, n);
+  return {dot(n, foot) - as<S>(radius), n, -(dot(between, foot) / dot(between, a)) * a};
 }
 
 }  // namespace linden

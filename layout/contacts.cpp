@@ -45,7 +45,11 @@ class Touch {
         }
         break;
       case ShapeKind::capsule:
-        for (const double z : ends_of(size[1])) add_sphere(body, {0, 0, z}, size[0]);
+        for (const double z : ends_of(size[1])) {
+          add_sphere(body, {0, 0, z}, size[0]);
+          if (z != 0) contacts_.spheres.back().outward = array_of((z < 0 ? -1 : 1) * body.pose.linear().col(2).normalized());
+        }
+        add_block(body, Vector3d::Zero(), {0, 0, size[1]}, size[0]);
         break;
       case ShapeKind::mesh: add_mesh(body); break;
     }
@@ -62,8 +66,16 @@ class Touch {
     contacts_.spheres.push_back({body.slot, array_of(body.pose * center), radius});
   }
 
+  /// Nothing where all its edges are 0.
+  void add_block(const BodyShape& body, const Vector3d& middle, const Vector3d& edges, double radius) {
+    if (edges.isZero()) return;
+    const auto axis = [&](int k) { return array_of(body.pose.linear().col(k).normalized()); };
+    contacts_.blocks.push_back({body.slot, array_of(body.pose * middle), {axis(0), axis(1), axis(2)}, array_of(edges / 2), radius});
+  }
+
   void add_corners(const BodyShape& body, const MeshBox& box) {
     const Vector3d middle = box.center(), edges = box.sizes();
+    add_block(body, middle, edges, 0);
     for (const double x : ends_of(edges.x())) {
       for (const double y : ends_of(edges.y())) {
         for (const double z : ends_of(edges.z())) add_sphere(body, middle + Vector3d(x, y, z), 0);

@@ -3,12 +3,14 @@
 // these and the ground is that of the shape (kernels/contact_geometry.hpp): a sphere or rim that rolls is met at its lowest place, whatever
 // material that is.
 //
-//   shape      spheres                      rims
+//   shape      spheres                         rims               blocks
 //   sphere     one
-//   box        one of radius 0 a corner
-//   capsule    one at each end
-//   cylinder                                one at each end
-//   mesh       the corners of its bounding box
+//   box        one of radius 0 a corner                           itself
+//   capsule    one at each end                                    what lies between them
+//   cylinder                                   one at each end
+//   mesh       the corners of its bounding box                    that box
+//
+// Blocks are for what a plane never meets first: ridges and peaks of a terrain.
 //
 // What coincides where a size is 0 is in here once. Files of meshes are read for this and nothing else: layout/mesh_path.hpp
 // finds them, layout/mesh_box.hpp reads them.
@@ -29,6 +31,7 @@ struct ContactSphere {
   Index slot;
   std::array<double, 3> center;  // [m]
   double radius;                 // [m]
+  std::array<double, 3> outward{};  // of the end of a capsule: along its axis, unit length
 };
 
 /// The edge of a disc: its lowest place touches first, and the places a quarter turn away and opposite hold it where it lies flat.
@@ -39,9 +42,19 @@ struct ContactRim {
   double radius;                 // [m]
 };
 
+/// A box, or a line with a radius about it: two of its halves are 0.
+struct ContactBlock {
+  Index slot;
+  std::array<double, 3> center;                // [m]
+  std::array<std::array<double, 3>, 3> axes;   // unit length, orthogonal
+  std::array<double, 3> half;                  // edges along them [m]
+  double radius = 0;                           // [m]
+};
+
 struct Contacts {
   std::vector<ContactSphere> spheres;  // sorted by slot
   std::vector<ContactRim> rims;        // sorted by slot
+  std::vector<ContactBlock> blocks;    // sorted by slot
   bool empty() const { return spheres.empty() && rims.empty(); }
 };
 

@@ -293,7 +293,7 @@ class Checker {
     const auto sorted = [](const auto& list) {
       return std::ranges::is_sorted(list, {}, [](const auto& entry) { return entry.slot; });
     };
-    if (!sorted(ground.contacts.spheres) || !sorted(ground.contacts.rims))
+    if (!sorted(ground.contacts.spheres) || !sorted(ground.contacts.rims) || !sorted(ground.contacts.blocks))
       fail("its contacts are in no order", "bodies in ascending order", "sort them by slot");
     for (const ContactSphere& sphere : ground.contacts.spheres) {
       require_slot(sphere.slot);
@@ -305,6 +305,13 @@ class Checker {
       for (const double value : rim.center) finite("the centre of a contact", value);
       unit("the axis of a contact", rim.axis);
       not_negative("the radius of a contact", rim.radius);
+    }
+    for (const ContactBlock& block : ground.contacts.blocks) {
+      require_slot(block.slot);
+      for (const double value : block.center) finite("the centre of a contact", value);
+      for (const auto& axis : block.axes) unit("the axis of a contact", axis);
+      for (const double value : block.half) not_negative("half an edge of a contact", value);
+      not_negative("the radius of a contact", block.radius);
     }
   }
 

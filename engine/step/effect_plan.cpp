@@ -80,7 +80,7 @@ std::vector<GroundPoint> points_of(const Ground& ground) {
   const int ranks = ground.terrain ? kTerrainRanks : 1;
   for (const ContactSphere& sphere : ground.contacts.spheres) {
     for (int rank = 0; rank < ranks; ++rank) {
-      points.push_back({.slot = sphere.slot, .center = sphere.center, .radius = sphere.radius, .rank = rank});
+      points.push_back({.slot = sphere.slot, .center = sphere.center, .radius = sphere.radius, .axis = sphere.outward, .rank = rank});
     }
   }
   for (const ContactRim& rim : ground.contacts.rims) {
@@ -88,6 +88,12 @@ std::vector<GroundPoint> points_of(const Ground& ground) {
       for (int quarter = 0; quarter < (rank == 0 ? 4 : 1); ++quarter) {
         points.push_back({rim.slot, rim.center, 0, rim.axis, rim.radius, quarter, rank});
       }
+    }
+  }
+  for (std::size_t k = 0; k < ground.contacts.blocks.size() && ground.terrain; ++k) {
+    const ContactBlock& block = ground.contacts.blocks[k];
+    for (int rank = 0; rank < kBlockRanks; ++rank) {
+      points.push_back({.slot = block.slot, .center = block.center, .radius = block.radius, .rank = rank, .block = static_cast<int>(k)});
     }
   }
   std::ranges::stable_sort(points, {}, &GroundPoint::slot);

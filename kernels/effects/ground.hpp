@@ -25,9 +25,11 @@
 // together are as stiff against a tilt of a disc that lies flat as springs all around it. What a rim loses (c') it loses by what its material
 // does at the four places, so that a disc does not rattle through its flat position without loss.
 //
+// On a terrain each point has the feature of its rank, in each lane its own. A block meets ridges and peaks, a line or face of its own each.
+//
 // units   gap, D [m]; k [N/m], c [N s/m] of one point
 // energy  P of points in the ground is potential; the rest of -F.D is taken
-// cost    some 200 operations a point and evaluation, 500 of a rim; a body none of whose points is near costs 20 a point
+// cost    some 300 operations a point and evaluation, 600 of a rim; of a body none of whose points is near 20 a point
 // source  Gonzalez, Time integration and discrete Hamiltonian systems (1996); Alart, Curnier, A mixed formulation for frictional contact
 //         problems prone to Newton like solution methods (1991)
 #pragma once
@@ -63,6 +65,7 @@ inline constexpr double kClearTilt = 1e-2;
   FIELD(Scalar, kind, 1, slots, "FeatureKind of a terrain's feature")                                 \
   FIELD(Scalar, line, 3, slots, "direction of an edge of the terrain, body frame at k")               \
   FIELD(Scalar, foot, 3, slots, "from a point of an edge or corner to the centre, likewise [m]")      \
+  FIELD(Scalar, along, 3, slots, "of a block: direction of its line, normal of its face into it")     \
   FIELD(Scalar, weight, 1, slots, "share of stiffness and damping that counts on a terrain")          \
   FIELD(Scalar, slip, 3, slots, "t of the evaluation last made, body frame at k [m]")                 \
   FIELD(Scalar, slip_before, 3, slots, "t of the evaluation before")                                  \
@@ -87,6 +90,11 @@ struct GroundPoints {
 template <class S>
 LINDEN_INLINE Vec3<S> spread3(const std::array<double, 3>& a) {
   return {as<S>(a[0]), as<S>(a[1]), as<S>(a[2])};
+}
+
+template <class S>
+LINDEN_INLINE Vec3<S> select3(const auto& condition, const Vec3<S>& yes, const Vec3<S>& no) {
+  return {select(condition, yes.x, no.x), select(condition, yes.y, no.y), select(condition, yes.z, no.z)};
 }
 
 /// Number l of a Scalar.
@@ -155,14 +163,26 @@ LINDEN_INLINE void place_on_plane(const GroundPoint& point, Index k, const Vec3<
 template <class S>
 class NearFeatures {
  public:
-  /// x: its centre, a: its axis, both in the plane's frame.
-  NearFeatures(const GroundPlan& plan, const GroundPoint& point, const Vec3<S>& x, const Vec3<S>& a) {
-    for (std::size_t l = 0; l < kLanes; ++l) {
-      counts_[l] = 0;
-      if (!(lane_of(x.z, l) - std::max(point.radius, point.rim_radius) < plan.highest + kFarAbove)) continue;
-      const TerrainFeatures features(*plan.ground.terrain, {lane_of(x, l), point.radius, lane_of(a, l), point.rim_radius});
+  /// x: its centre, frame: the body's axes, both in the plane's frame.
+  NearFeatures(const GroundPlan& plan, const GroundPoint& point, const Vec3<S>& x, const Mat3<S>& frame) {
+    const HeightField& field = *plan.ground.terrain;
+    const auto keep = [&](std::size_t l, const auto& features) {
       counts_[l] = features.count();
       for (int rank = 0; rank < features.count(); ++rank) features_[l][static_cast<std::size_t>(rank)] = features[rank];
+    };
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      counts_[l] = 0;
+      const Vec3<double> center = lane_of(x, l);
+      if (!(center.z - extent(plan, point) < plan.highest + kFarAbove)) continue;
+      const Mat3<double> axes{lane_of(frame.x, l), lane_of(frame.y, l), lane_of(frame.z, l)};
+      const auto direction = [&](const std::array<double, 3>& a) { return axes * Vec3<double>{a[0], a[1], a[2]}; };
+      if (point.block < 0) {
+        keep(l, TerrainFeatures(field, {center, point.radius, direction(point.axis), point.rim_radius}));
+      } else {
+        const ContactBlock& block = plan.ground.contacts.blocks[static_cast<std::size_t>(point.block)];
+        const std::array<Vec3<double>, 3> turned{direction(block.axes[0]), direction(block.axes[1]), direction(block.axes[2])};
+        keep(l, BlockFeatures(field, {center, turned, block.half, block.radius}));
+      }
     }
   }
 
@@ -180,7 +200,14 @@ class NearFeatures {
 
  private:
   static constexpr std::size_t kLanes = sizeof(S) / sizeof(typename ElementOf<S>::type);
-  std::array<std::array<TerrainFeature, kTerrainRanks>, kLanes> features_;
+
+  static double extent(const GroundPlan& plan, const GroundPoint& point) {
+    if (point.block < 0) return std::max(point.radius, point.rim_radius);
+    const std::array<double, 3>& half = plan.ground.contacts.blocks[static_cast<std::size_t>(point.block)].half;
+    return std::sqrt(half[0] * half[0] + half[1] * half[1] + half[2] * half[2]) + point.radius;
+  }
+
+  std::array<std::array<TerrainFeature, std::max(kTerrainRanks, kBlockRanks)>, kLanes> features_;
   std::array<int, kLanes> counts_;
 };
 
@@ -211,6 +238,42 @@ void place_on_terrain(const GroundPoint& point, Index k, const NearFeatures<S>& 
       store(points.arm, k, Vec3<S>{select(pierced, at.v.x, arm.x), select(pierced, at.v.y, arm.y), select(pierced, at.v.z, arm.z)});
     }
   }
+}
+
+/// How the line or face of a block touches its feature, of each lane its own kind.
+template <class S>
+BlockTouch<S> touch_at(const GroundPoint& point, Index k, const GroundPoints<S>& points, const Vec3<S>& along, const Vec3<S>& foot) {
+  const S zero(0.0);
+  const auto line = load<Vec3, S>(points.line, k), toward = load<Vec3, S>(points.normal, k);
+  BlockTouch<S> touch{as<S>(kNothingNear), toward, {zero, zero, zero}};
+  for (const BlockContact contact : {BlockContact::crossing, BlockContact::corner_on_line, BlockContact::corner_on_face}) {
+    const auto is = points.kind(k) == as<S>(static_cast<double>(FeatureKind::crossing) + static_cast<double>(contact));
+    if (!any(is)) continue;
+    const BlockTouch<S> it = touch_block(contact, along, line, foot, point.radius, toward);
+    touch = {select(is, it.gap, touch.gap), select3(is, it.normal, touch.normal), select3(is, it.arm, touch.arm)};
+  }
+  return touch;
+}
+
+/// The same of a block, `center` that of the block.
+template <class S>
+void place_block(const GroundPoint& point, Index k, const Vec3<S>& center, const NearFeatures<S>& near, const Mat3<S>& to_body,
+                 GroundPoints<S>& points) {
+  const Vec3<double> nowhere{0, 0, 0};
+  const auto vector = [&](const auto& part, const Vec3<double>& none) { return to_body * near.vector(point.rank, part, none); };
+  const auto number = [&](const auto& part, double none) { return near.number(point.rank, part, none); };
+  const Vec3<S> n = vector([](const TerrainFeature& f) { return f.normal; }, {0, 0, 1});
+  store(points.center, k, center + vector([](const TerrainFeature& f) { return f.from; }, nowhere));
+  store(points.normal, k, n);
+  store(points.along, k, vector([](const TerrainFeature& f) { return f.along; }, nowhere));
+  store(points.line, k, vector([](const TerrainFeature& f) { return f.line; }, nowhere));
+  store(points.foot, k, vector([](const TerrainFeature& f) { return f.foot; }, nowhere));
+  points.kind(k) = number([](const TerrainFeature& f) { return static_cast<double>(f.kind); }, 0);
+  points.weight(k) = number([](const TerrainFeature& f) { return f.weight; }, 0);
+  points.gap(k) = number([](const TerrainFeature& f) { return f.gap; }, kNothingNear);
+  // what is near is looked at, however it turns
+  points.clearance(k) = select(points.weight(k) > S(0.0), S(0.0), as<S>(kNothingNear));
+  store(points.arm, k, touch_at(point, k, points, load<Vec3, S>(points.along, k), load<Vec3, S>(points.foot, k)).arm - as<S>(point.radius) * n);
 }
 
 /// Where the points are over the ground at the beginning of a step; potential energy of those inside [J].
@@ -247,9 +310,13 @@ S find_ground(const GroundPlan& plan, const Field<S, 12>& pose, GroundPoints<S>&
     } else {
       const Vec3<S> in_plane = frame * x - Vec3<S>{zero, zero, as<S>(ground.height)};
       const Mat3<S> to_body = transpose(frame * T.R);
-      const NearFeatures<S> near(plan, first, in_plane, frame * (T.R * spread3<S>(first.axis)));
+      const NearFeatures<S> near(plan, first, in_plane, frame * T.R);
       each_point([&](const GroundPoint& point) {
-        place_on_terrain(point, k, near, to_body, points);
+        if (point.block < 0) {
+          place_on_terrain(point, k, near, to_body, points);
+        } else {
+          place_block(point, k, c, near, to_body, points);
+        }
         add_potential(k, points.weight(k));
       });
     }
@@ -311,11 +378,6 @@ struct Meeting {
 };
 
 template <class S>
-LINDEN_INLINE Vec3<S> select3(const auto& condition, const Vec3<S>& yes, const Vec3<S>& no) {
-  return {select(condition, yes.x, no.x), select(condition, yes.y, no.y), select(condition, yes.z, no.z)};
-}
-
-template <class S>
 LINDEN_INLINE Wrench<S> select6(const auto& condition, const Wrench<S>& yes, const Wrench<S>& no) {
   return {select3(condition, yes.n, no.n), select3(condition, yes.f, no.f)};
 }
@@ -351,6 +413,19 @@ Meeting<S> meet_sphere(const GroundPlan& plan, const GroundPoint& point, Index k
   }
   const Vec3<S> arm = as<S>(-point.radius) * n;
   return {gap, n, arm, Slip<S>(n, moved, body.turn, arm), bend, none};
+}
+
+/// A block.
+template <class S>
+Meeting<S> meet_block(const GroundPoint& point, Index k, const GroundPoints<S>& points, const BodyMotion<S>& body, const Vec3<S>& moved) {
+  const S half(0.5);
+  const auto along = load<Vec3, S>(points.along, k), foot = load<Vec3, S>(points.foot, k);
+  const BlockTouch<S> begin = touch_at(point, k, points, along, foot);
+  const BlockTouch<S> end = touch_at(point, k, points, along + turned_by(body.D.r, along), foot + moved);
+  const GapChange<S> gap{end.gap - begin.gap, half * (begin.gradient() + end.gradient()), end.gradient()};
+  const Vec3<S> n = unit_vector(gap.mean.f), arm = half * (begin.arm + end.arm) - as<S>(point.radius) * n;
+  const Mat3<S> none = diagonal(S(0.0));
+  return {gap, n, arm, Slip<S>(n, moved, body.turn, arm), none, none};
 }
 
 /// One of the four points of a rim.
@@ -479,7 +554,7 @@ LINDEN_INLINE void add_jacobian(const GroundPoint& point, const S& scale, const 
   const Mat3<S> H = (scale * friction.b) * (diagonal(one) - outer(n, n) - friction.turns * outer(d, d));
   const Mat3<S> bb = H * R;
   Mat3<S> ba = minus * times_hat(bb, c);
-  if (rim || point.radius > 0) {
+  if (rim || point.radius > 0 || point.block >= 0) {
     const Mat3<S> Ho = times_hat(H, o);
     ba = ba - (Ho - S(0.5) * times_hat(Ho, body.turn)) * R;
   }
@@ -519,7 +594,9 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     if (!motion) motion.emplace(D);
     const BodyMotion<S>& body = *motion;
     const bool rim = point.rim_radius > 0;
-    const Meeting<S> meeting = rim ? meet_rim(plan, point, k, points, body, moved) : meet_sphere(plan, point, k, points, body, moved);
+    const Meeting<S> meeting = rim               ? meet_rim(plan, point, k, points, body, moved)
+                               : point.block < 0 ? meet_sphere(plan, point, k, points, body, moved)
+                                                 : meet_block(point, k, points, body, moved);
     points.rise(k) = meeting.gap.rise;
     if (far(gap + meeting.gap.rise)) continue;
 

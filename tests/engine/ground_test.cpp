@@ -29,7 +29,11 @@ struct Body {
   Contacts touching;
 };
 
-Body ball() { return {"ball", 0.4 * kRadius * kRadius, kRadius, 1, {.spheres = {{.slot = 1, .center = {}, .radius = kRadius}}, .rims = {}}}; }
+ContactBlock block(const std::array<double, 3>& half, double radius) {
+  return {.slot = 1, .center = {}, .axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, .half = half, .radius = radius};
+}
+
+Body ball() { return {"ball", 0.4 * kRadius * kRadius, kRadius, 1, {.spheres = {{.slot = 1, .center = {}, .radius = kRadius}}, .rims = {}, .blocks = {}}}; }
 Body wheel() {
   Body it{"wheel", 0.5 * kRadius * kRadius, kRadius, 2, {}};
   for (const double y : {-0.05, 0.05}) it.touching.rims.push_back({.slot = 1, .center = {0, y, 0}, .axis = {0, 1, 0}, .radius = kRadius});
@@ -37,7 +41,10 @@ Body wheel() {
 }
 Body capsule() {
   Body it{"capsule", 0.45 * kRadius * kRadius, kRadius, 2, {}};
-  for (const double y : {-0.1, 0.1}) it.touching.spheres.push_back({.slot = 1, .center = {0, y, 0}, .radius = kRadius});
+  for (const double y : {-0.1, 0.1}) {
+    it.touching.spheres.push_back({.slot = 1, .center = {0, y, 0}, .radius = kRadius, .outward = {0, 10 * y, 0}});
+  }
+  it.touching.blocks = {block({0, 0.1, 0}, kRadius)};
   return it;
 }
 Body box() {
@@ -47,6 +54,7 @@ Body box() {
       for (const double z : {-0.05, 0.05}) it.touching.spheres.push_back({.slot = 1, .center = {x, y, z}, .radius = 0});
     }
   }
+  it.touching.blocks = {block({0.1, 0.1, 0.05}, 0)};
   return it;
 }
 /// A cylinder on its flat side.
@@ -287,6 +295,58 @@ TEST_CASE("beyond the map its last heights go on, level where they are, and noth
     Simulation lost = placed(body, ground, {1e12, 0, 0.5, 0, 0, 0, 1}, std::vector<double>(6, 0.0));
     run(lost, 10);
     CHECK(lost.velocities()[5] == Approx(-kG * 0.01).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("ridges and peaks hold what lies on them between its corners and ends", "[ground]") {
+  // two ridges along y, 0.1 m apart and as high
+  Ground ridges{.stiffness = 1e5, .damping = 300, .friction = 0.8};
+  ridges.terrain = along_x([](double x) { return std::abs(std::abs(x) - 0.05) < 1e-9 ? 0.1 : 0.0; }, -1, 1, 0.05);
+  struct Lying {
+    Body body;
+    double contacts;
+    bool turned;
+  };
+  for (const auto& [body, contacts, turned] : {Lying{box(), 4, false}, Lying{capsule(), 2, true}}) {
+    const double quarter = turned ? std::sqrt(0.5) : 0;
+    Simulation lying = placed(body, ridges, {0, 0, 0.1 + body.height + 1e-3, 0, 0, quarter, turned ? quarter : 1}, std::vector<double>(6, 0.0));
+    run(lying, 3000);
+    INFO(body.name);
+    CHECK(lying.positions()[2] == Approx(0.1 + body.height - kG / (contacts * ridges.stiffness)).margin(1e-6));
+    CHECK(std::abs(lying.positions()[0]) + std::abs(lying.positions()[1]) < 1e-6);
+    CHECK(std::abs(lying.positions()[3]) + std::abs(lying.positions()[4]) < 1e-6);
+  }
+  // three peaks
+  Ground peaks = ridges;
+  HeightField field{.columns = 41, .rows = 41, .spacing_x = 0.05, .spacing_y = 0.05, .origin_x = -1, .origin_y = -1, .heights = std::vector<double>(41 * 41, 0.0)};
+  for (const auto& [column, row] : {std::pair{19, 19}, {21, 19}, {20, 21}}) field.heights[static_cast<std::size_t>(row * 41 + column)] = 0.1;
+  peaks.terrain = field;
+  Simulation lying = placed(box(), peaks, {0, 0, 0.151, 0, 0, 0, 1}, std::vector<double>(6, 0.0));
+  run(lying, 3000);
+  // the peak at y = 0.05 bears half of the weight, the two at -0.05 a quarter each
+  CHECK(lying.positions()[2] == Approx(0.15 - kG * (0.5 + 0.25) / 2 / peaks.stiffness).margin(2e-6));
+  CHECK(std::abs(lying.positions()[0]) < 1e-6);
+}
+
+TEST_CASE("a box and a capsule that fall across ridges and bounce are given no energy beyond the second order of the step", "[ground]") {
+  for (const Body& body : {box(), capsule()}) {
+    double gained[2];
+    for (int halving = 0; halving < 2; ++halving) {
+      Ground ridges{.stiffness = 1e5, .damping = 0, .friction = 0};
+      ridges.terrain = along_x([](double x) { return std::abs(std::abs(x) - 0.05) < 1e-9 ? 0.1 : 0.0; }, -1, 1, 0.05);
+      Simulation falling = placed(body, ridges, {0.01, 0, 0.3, 0.05, 0.04, std::sqrt(0.5), std::sqrt(0.5 - 0.05 * 0.05 - 0.04 * 0.04)},
+                                  std::vector<double>(6, 0.0), 4e-4 / (1 + halving));
+      const double start = falling.energy().total();
+      double most = start;
+      for (int k = 0; k < 700 * (1 + halving); ++k) {
+        run(falling, 1);
+        most = std::max(most, falling.energy().total());
+      }
+      gained[halving] = most - start;
+    }
+    INFO(body.name << ": " << gained[0] << ", " << gained[1]);
+    CHECK(gained[0] < 5e-3);
+    CHECK((gained[1] < 1e-5 || gained[1] < 0.5 * gained[0]));
   }
 }
 

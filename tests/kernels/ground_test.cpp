@@ -55,7 +55,7 @@ struct Pair {
 Vec3<double> moved_by(const Displacement<double>& D, const Vector3d& c) { return point_displacement(D, vec(c)); }
 
 std::vector<Pair> random_pairs(Numbers& random) {
-  std::vector<Pair> pairs(5);
+  std::vector<Pair> pairs(8);
   for (Pair& pair : pairs) {
     pair.center = random.vector(0.5);
     pair.axis = random.direction();
@@ -103,6 +103,31 @@ std::vector<Pair> random_pairs(Numbers& random) {
     force = moment = none;
     return circle_over_line(vec(pierced.line), vec(pierced.center - pierced.point), vec(pierced.axis), D.r, moved_by(D, pierced.center));
   };
+  // lines and faces of a block; `axis` is theirs
+  const auto across = [](const Vector3d& line, const Vector3d& a) { return a.cross(line); };
+  Pair& crossing = pairs[5];
+  if (std::abs(crossing.line.dot(crossing.axis)) > 0.9) crossing.axis = crossing.line.unitOrthogonal();
+  const Vector3d toward = across(crossing.line, crossing.axis) * (random.within(1) < 0 ? -1 : 1);
+  crossing.gap = [=](const Vector3d& c, const Vector3d& a) {
+    const Vector3d w = across(crossing.line, a);
+    return (w.dot(toward) < 0 ? -1 : 1) * w.normalized().dot(c - crossing.point) - crossing.radius;
+  };
+  Pair& on_line = pairs[6];
+  on_line.gap = [=](const Vector3d& c, const Vector3d& a) { return a.cross(c - on_line.point).norm() - on_line.radius; };
+  Pair& on_face = pairs[7];
+  on_face.gap = [=](const Vector3d& c, const Vector3d& a) { return a.dot(c - on_face.point); };
+  const auto touching = [](const Pair& p, BlockContact contact, const Vector3d& side) {
+    return [=](const Displacement<double>& D, Mat3<double>& force, Mat3<double>& moment) {
+      force = moment = diagonal(0.0);
+      const Vec3<double> a = vec(p.axis), a1 = a + turned_by(D.r, a), foot = vec(p.center - p.point);
+      const auto begin = touch_block(contact, a, vec(p.line), foot, p.radius, vec(side));
+      const auto end = touch_block(contact, a1, vec(p.line), foot + moved_by(D, p.center), p.radius, vec(side));
+      return GapChange<double>{end.gap - begin.gap, 0.5 * (begin.gradient() + end.gradient()), end.gradient()};
+    };
+  };
+  crossing.change = touching(crossing, BlockContact::crossing, toward);
+  on_line.change = touching(on_line, BlockContact::corner_on_line, toward);
+  on_face.change = touching(on_face, BlockContact::corner_on_face, toward);
   return pairs;
 }
 
@@ -138,7 +163,7 @@ TEST_CASE("a gap rises by what its formula says, and its end is the gradient the
 }
 
 TEST_CASE("the wrench along a gap does the gap's work: exactly where only the centre counts, to the third power of a turn elsewhere", "[ground]") {
-  std::array<double, 5> error{}, half_error{};
+  std::array<double, 8> error{}, half_error{};
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     for (const double turn : {0.02, 0.01}) {
       Numbers random(seed);

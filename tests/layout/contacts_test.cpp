@@ -253,6 +253,20 @@ TEST_CASE("a sphere touches as itself, a box with its corners, a capsule with it
   REQUIRE(cylinder.rims[1].center == std::array{1.0, 2.0, 4.5});
   REQUIRE(cylinder.rims[0].axis == std::array{0.0, 0.0, 1.0});
   REQUIRE(cylinder.rims[0].radius == 0.5);
+
+  // what lies between them, for ridges and peaks
+  REQUIRE(sphere.blocks.empty());
+  REQUIRE(box.blocks.size() == 1);
+  REQUIRE(box.blocks[0].center == std::array{1.0, 2.0, 3.0});
+  REQUIRE(box.blocks[0].half == std::array{0.5, 1.0, 2.0});
+  REQUIRE(box.blocks[0].radius == 0);
+  REQUIRE(capsule.blocks.size() == 1);
+  REQUIRE(capsule.blocks[0].half == std::array{0.0, 0.0, 1.5});
+  REQUIRE(capsule.blocks[0].axes[2] == std::array{0.0, 0.0, 1.0});
+  REQUIRE(capsule.blocks[0].radius == 0.5);
+  REQUIRE(cylinder.blocks.empty());
+  REQUIRE(capsule.spheres[0].outward == std::array{0.0, 0.0, -1.0});
+  REQUIRE(capsule.spheres[1].outward == std::array{0.0, 0.0, 1.0});
 }
 
 TEST_CASE("what coincides where a size is zero touches once") {
@@ -260,6 +274,7 @@ TEST_CASE("what coincides where a size is zero touches once") {
   REQUIRE(quiet_contacts(parse(turning(collision("<box size=\"0 0 0\"/>")))).spheres.size() == 1);
   REQUIRE(quiet_contacts(parse(turning(collision("<capsule radius=\"1\" length=\"0\"/>")))).spheres.size() == 1);
   REQUIRE(quiet_contacts(parse(turning(collision("<cylinder radius=\"1\" length=\"0\"/>")))).rims.size() == 1);
+  REQUIRE(quiet_contacts(parse(turning(collision("<capsule radius=\"1\" length=\"0\"/>")))).blocks.empty());
 }
 
 TEST_CASE("what is fixed to the world touches nothing, and contacts are sorted by slot") {
