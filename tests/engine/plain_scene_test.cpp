@@ -54,7 +54,10 @@ struct OnSlope {
     const double sag = 2 * kG * std::cos(slope) / (1e4 * static_cast<double>(resting(shape)));
     place = numbers({0, 0, half - sag, 0, 0, 0, 1});
   }
-  static int resting(const LinkShape& shape) { return shape.shape.kind == ShapeKind::box ? 4 : shape.shape.kind == ShapeKind::cylinder ? 2 : 1; }
+  /// Contacts that bear it.
+  static int resting(const LinkShape& shape) {
+    return shape.shape.kind == ShapeKind::box ? 4 : shape.shape.kind == ShapeKind::cylinder ? 2 : 1;
+  }
   /// Way along the slope after a second from rest.
   double way(int steps) const {
     PlainScene scene(model, effects, gravity);

@@ -45,8 +45,8 @@ std::vector<Told> told(const Batch& batch) {
   const Batch::Observation observed = batch.observe();
   std::vector<Told> result;
   for (std::int64_t i = 0; i < batch.size(); ++i) {
-    result.push_back({numbers(batch.positions().instance(i)), numbers(batch.momenta().instance(i)), numbers(observed.velocities().instance(i)),
-                      numbers(observed.energies().instance(i)), batch.record(i)});
+    result.push_back({numbers(batch.positions().instance(i)), numbers(batch.momenta().instance(i)),
+                      numbers(observed.velocities().instance(i)), numbers(observed.energies().instance(i)), batch.record(i)});
   }
   return result;
 }

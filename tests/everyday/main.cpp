@@ -50,7 +50,8 @@ Asked asked(int argc, char** argv, bool& help) {
   if (!only.empty()) {
     const auto found = std::ranges::find(kChecks, only, [](Check check) { return name(check); });
     if (found == kChecks.end()) {
-      throw InputError(fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity or bits", linden::quoted(only)));
+      throw InputError(
+          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity or bits", linden::quoted(only)));
     }
     result.only = *found;
   }
@@ -71,7 +72,8 @@ std::string text_of(const EverydayScene& scene, const std::vector<Difference>& l
 /// Says what differs in the order of the scenes, however many threads try them.
 class Teller {
  public:
-  Teller(const Asked& what, std::uint64_t scenes) : what_(what), lines_(scenes), ready_(scenes, 0), progress_(static_cast<std::int64_t>(scenes), 1, "scenes") {}
+  Teller(const Asked& what, std::uint64_t scenes)
+      : what_(what), lines_(scenes), ready_(scenes, 0), progress_(static_cast<std::int64_t>(scenes), 1, "scenes") {}
 
   void tell(std::uint64_t at, const EverydayScene& scene, const std::vector<Difference>& list) {
     const std::string text = text_of(scene, list, what_.verbose);
@@ -135,7 +137,8 @@ int run_everyday(int argc, char** argv) {
         oneapi::tbb::simple_partitioner());
   });
   const std::uint64_t differing = teller.finish();
-  fmt::print("{} in {:.0f} s, {} differ\n", counted(static_cast<std::int64_t>(what.scenes), "scene"), seconds(Progress::Clock::now() - begin), differing);
+  fmt::print("{} in {:.0f} s, {} differ\n", counted(static_cast<std::int64_t>(what.scenes), "scene"),
+             seconds(Progress::Clock::now() - begin), differing);
   return differing == 0 ? 0 : 1;
 }
 

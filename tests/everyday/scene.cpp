@@ -101,7 +101,8 @@ class Maker {
         link.pitch = (chance(0.5) ? 1 : -1) * spread(0.003, 0.1);
       }
       if (!root) {
-        const auto parent = static_cast<Index>(shape < 0.5 ? i - 1 : shape < 0.85 ? static_cast<Index>(random_.below(static_cast<std::uint64_t>(i))) : 0);
+        const auto any = static_cast<Index>(random_.below(static_cast<std::uint64_t>(i)));
+        const Index parent = shape < 0.5 ? i - 1 : shape < 0.85 ? any : 0;
         link.parent = fmt::format("link{}", parent + 1);
         link.placement.translation() = Vector3d(length[static_cast<std::size_t>(parent)], 0, 0);
       }
@@ -347,7 +348,8 @@ class Maker {
       const double mass = model().constants.inertia(i, 0);
       if (!(mass > 0) || chance(0.3)) continue;
       const double r = std::min(rate(), 0.3 / h_);
-      scene_.effects.drag.push_back({.slot = i, .linear = chance(0.7) ? mass * r : 0, .quadratic = chance(0.5) ? mass * std::min(r, 3.0) : 0});
+      const double linear = chance(0.7) ? mass * r : 0, quadratic = chance(0.5) ? mass * std::min(r, 3.0) : 0;
+      scene_.effects.drag.push_back({.slot = i, .linear = linear, .quadratic = quadratic});
     }
     if (chance(0.4)) scene_.effects.wind = {either_way(5), either_way(5), 0};
   }
