@@ -409,6 +409,8 @@ class EffectSweeps {
     on(plan_.bodies, "add_given_up", [=, this, &work] { add_given_up(tree_, work.placement, bodies_.given, work.impulse); });
     on(plan_.bodies, "world_placement_down", [=, this, &work] { world_placement_down(tree_, work.placement, bodies_.pose); });
     on(points, "find_ground", [=, this] { find_ground(plan_.ground, bodies_.pose, points_); });
+    on(true, "end_reading",
+       [=, this, &constants, &work, &end] { end_reading(constants, work.placement, S(0.0) < S(1.0), work.impulse, end); });
   }
   /// Taken from the work of the ground once the potential at the end is known.
   S ground_stored() const { return ground_potential_ - ground_before_; }

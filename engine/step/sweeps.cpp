@@ -77,6 +77,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   const std::string_view left = one_pass ? "screw, displacement, impulse, innovation, force" : "screw, displacement, impulse, residual, force";
   add(true, {last, "momentum_update_map", left, "p"});
   add(ties, {last, "fold_mimics", "p", "p"});
+  add(plan.any(), {last, "end_reading", "joint impulses, body impulses, placement", "reading"});
   return list;
 }
 

@@ -24,7 +24,8 @@ TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no ot
   const Model model = chain(3);
   const Options options;
   const auto plain = names_of(sweeps_of(model, options, EffectPlan(model, options, {})));
-  const std::vector<std::string> joint{"joint_impulses_map", "joint_impulses_end_map"}, body{"add_given_up", "world_placement_down"};
+  const std::vector<std::string> joint{"joint_impulses_map", "joint_impulses_end_map", "end_reading"},
+      body{"add_given_up", "world_placement_down", "end_reading"};
   const auto check_added = [&](const Effects& effects, std::vector<std::string> sweeps) {
     std::multiset<std::string> expected = plain;
     expected.insert(sweeps.begin(), sweeps.end());
