@@ -169,8 +169,8 @@ void check_position(const EverydayScene& scene, Differences& found) {
 
 namespace {
 
-/// Joint friction acts at the beginning of a step, half a step early (kernels/effects/friction.hpp): a first order of its own, h f |v|. Each
-/// time a joint stops, starts or turns it does so within a step: h f at a speed of up to h f / inertia.
+/// Joint friction acts at the beginning of a step, half a step early (kernels/effects/friction.hpp): a first order of its own, h f |v|.
+/// Each time a joint stops, starts or turns it does so within a step: h f at a speed of up to h f / inertia.
 double friction_leaves(const EverydayScene& scene, const Walk& walk) {
   if (scene.effects.friction.empty()) return 0;
   const PlainScene plain = plain_of(scene);
@@ -212,7 +212,9 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
     VectorXd change = h * plain.acceleration();
     const VectorXd inertia = plain.row_inertia();
     double sum = 0.5 * change.dot(plain.mass_matrix() * change);
-    for (const JointFriction& friction : scene.effects.friction) sum += 0.5 * h * h * friction.force * friction.force / inertia[friction.row];
+    for (const JointFriction& friction : scene.effects.friction) {
+      sum += 0.5 * std::pow(h * friction.force, 2) / inertia[friction.row];
+    }
     if (scene.effects.ground) {
       const double push = scene.effects.ground->stiffness;
       const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);
@@ -265,8 +267,8 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
     }
     if (!(drop <= allowed)) {
       found.add(Check::energy, fmt::format("{} gives", effect),
-                fmt::format("{}: {} gave {:.3g} J; expected nothing, {:.3g} J at most (energies of {:.3g} J)", at(scene, place), effect, drop,
-                            allowed, scale));
+                fmt::format("{}: {} gave {:.3g} J; expected nothing, {:.3g} J at most (energies of {:.3g} J)", at(scene, place), effect,
+                            drop, allowed, scale));
     }
   };
   gives("damping", &EffectWork<double>::damping, !scene.effects.damping.empty());
@@ -342,12 +344,12 @@ class Reader {
       } else if (speed <= 0.1 * known_[row]) {
         if (std::abs(v[row]) <= known_[row]) continue;
         found.add(Check::rest, fmt::format("{}: rests and reads a speed", who_),
-                  fmt::format("{}: {} stands still and reads {:.3g} per s; expected {:.1g} at most", at(scene_, node), row_name(scene_, row),
-                              v[row], known_[row]));
+                  fmt::format("{}: {} stands still and reads {:.3g} per s; expected {:.1g} at most", at(scene_, node),
+                              row_name(scene_, row), v[row], known_[row]));
       } else if (!scene_.stiff && !(std::abs(v[row] - middle) <= bend + known_[row])) {
         found.add(Check::velocity, fmt::format("{}: not the motion's", who_),
-                  fmt::format("{}: {} reads {:.6g} per s; expected {:.6g}, that of the positions around it, within {:.2g}", at(scene_, node),
-                              row_name(scene_, row), v[row], middle, bend + known_[row]));
+                  fmt::format("{}: {} reads {:.6g} per s; expected {:.6g}, that of the positions around it, within {:.2g}",
+                              at(scene_, node), row_name(scene_, row), v[row], middle, bend + known_[row]));
       }
     }
     for (const JointLimit& limit : scene_.effects.limits) after_blow(limit, node, *q[2], mean, v, found);
