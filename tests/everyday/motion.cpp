@@ -223,7 +223,9 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
         if (contact.gap > 0) continue;
         // of the push, and of its change along the way
         const double mass = scene.model->constants.inertia(contact.slot, 0);
-        const double way = h * motions[static_cast<std::size_t>(contact.slot)].velocity.norm(), impulse = h * push * (way - contact.gap);
+        const auto& motion = motions[static_cast<std::size_t>(contact.slot)];
+        const double sinks = reference::vector_of(scene.effects.ground->normal).dot(motion.velocity_at(contact.gauge));
+        const double way = h * std::abs(sinks), impulse = h * push * (way - contact.gap);
         sum += 0.5 * impulse * impulse / mass + push * way * way;
       }
     }
