@@ -84,7 +84,7 @@ class Maker {
       const bool root = i == 0 || chance(0.03);
       length.push_back(spread(0.05, 0.5));
       const double width = length.back() * random_.uniform(0.1, 0.6), mass = spread(0.05, 10);
-      const bool round = chance(0.3);
+      const bool round = chance(on_ground() ? 0.5 : 0.3);
       if (root && floating) {
         link.type = JointType::free;
         link.placement.translation() = Vector3d(0, 2.0 * i, 0);
@@ -116,7 +116,7 @@ class Maker {
           ball.pose.translation() = center;
           ball.shape.kind = ShapeKind::sphere;
           ball.shape.size = {0.5 * width, 0, 0};
-          if (chance(0.4)) {
+          if (chance(0.5)) {
             // a cylinder, lying or standing
             ball.shape.kind = ShapeKind::cylinder;
             ball.shape.size[1] = width * random_.uniform(0.2, 2);
@@ -155,7 +155,7 @@ class Maker {
     InitialState& start = scene_.start;
     start.positions = model().neutral();
     start.velocities.assign(static_cast<std::size_t>(model().tree.shape.velocities), 0.0);
-    const bool bent = chance(0.7), moves = kind_ == swing || kind_ == drag || chance(kind_ == rest_on_ground ? 0.3 : 0.5);
+    const bool bent = chance(0.7), moves = kind_ == swing || kind_ == drag || chance(kind_ == rest_on_ground ? 0.4 : 0.5);
     const double fast = chance(0.1) ? 8 : 2;
     for (Index i = 1; i < model().tree.shape.slots; ++i) {
       const JointKind joint = model().tree.kind(i);

@@ -123,8 +123,8 @@ class PlainForces {
     }
   }
 
-  /// Over a plane; terrain is not in here. A rim touches at its lowest place, and at those opposite and a quarter turn to either side, which
-  /// stay where they are in space while the rim turns: the last two as high as its centre.
+  /// Over a plane; terrain is not in here. A rim touches at its lowest place, and at those opposite and a quarter turn to either side,
+  /// which stay where they are in space while the rim turns: the last two as high as its centre.
   std::vector<PlainContact> contacts(const std::vector<BodyMotion>& motions) const {
     std::vector<PlainContact> result;
     if (!effects_->ground) return result;
