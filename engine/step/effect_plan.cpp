@@ -29,6 +29,14 @@ double moved_mass(const Model& model, Index slot) {
   return own > 0 ? own : model.constants.subtree_mass(slot);
 }
 
+/// Mass behind a blow on a body: its own and that of links it hangs on, of these no more than its own.
+double struck_mass(const Model& model, Index slot) {
+  const double own = moved_mass(model, slot);
+  double held = 0;
+  for (Index up = model.tree.parent(slot); up > 0; up = model.tree.parent(up)) held += model.constants.inertia(up, 0);
+  return own + std::min(own, held);
+}
+
 /// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included. A leader feels that of
 /// its coordinate.
 std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>& rotors) {
@@ -107,14 +115,14 @@ std::optional<StiffContact> stiffest_unresolved(const Model& model, const Option
   const Ground& ground = *effects.ground;
   Index stiffest = 0;
   const auto look_at = [&](Index slot) {
-    const double mass = moved_mass(model, slot), damping = 0.5 * ground.damping / std::sqrt(ground.stiffness * mass);
+    const double mass = struck_mass(model, slot), damping = 0.5 * ground.damping / std::sqrt(ground.stiffness * mass);
     const bool resolved = begin_share(options.step * options.step * ground.stiffness / mass) <= 0.5;
-    if (!resolved && damping < kBouncesLittle && (stiffest == 0 || mass < moved_mass(model, stiffest))) stiffest = slot;
+    if (!resolved && damping < kBouncesLittle && (stiffest == 0 || mass < struck_mass(model, stiffest))) stiffest = slot;
   };
   for (const ContactSphere& sphere : ground.contacts.spheres) look_at(sphere.slot);
   for (const ContactRim& rim : ground.contacts.rims) look_at(rim.slot);
   if (stiffest == 0) return std::nullopt;
-  return StiffContact{model.names.body[static_cast<std::size_t>(stiffest)], moved_mass(model, stiffest)};
+  return StiffContact{model.names.body[static_cast<std::size_t>(stiffest)], struck_mass(model, stiffest)};
 }
 
 EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {

@@ -304,13 +304,12 @@ class EffectSweeps {
       impulse_up(tree_, constants, placement, scratch, projected);
     }
     for (Index row = 0; row < reading_.rows(); ++row) {
-      S now = plan_.joints ? excess_(row) : zero;
-      const auto held = now > most;
-      if (plan_.bodies) now = now + projected(row);
-      now = select(held, zero, now);
-      const S read = select(held, as<S>(kHeld), lasting(now, excess_before_(row)));
+      S read = plan_.joints ? excess_(row) : zero;
+      if (plan_.bodies) {
+        read = select(read > most, read, read + lasting(projected(row), excess_before_(row)));
+        excess_before_(row) = select(moves, projected(row), excess_before_(row));
+      }
       reading_(row) = select(moves, read, reading_(row));
-      excess_before_(row) = select(moves, now, excess_before_(row));
     }
   }
   /// Adds to p what velocities are read from beside it, and prepares with_reading.
@@ -454,7 +453,7 @@ class EffectSweeps {
   S h_{};
   double creep_ = 0;
   Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
-  Field<S> excess_before_;     // of the step before, of bodies too; zero where a joint is held
+  Field<S> excess_before_;     // the same of bodies, seen from the joints, of the step before
   Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held
   Field<S> reading_stiffness_;
   const Field<S>* q_ = nullptr;

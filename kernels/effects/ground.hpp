@@ -11,7 +11,7 @@
 //
 // The feature of the ground that a point meets is that of the beginning of the step (kernels/terrain.hpp), the tangent plane of an edge or
 // corner that of the middle of it. Over an edge that turns down the gap to a face that has been left is less than that to the edge: energy is
-// lost, to the second order of the step, and gained to the same order where a face is reached; a step through a crease loses none.
+// lost, to the second order of the step, and gained to the same order where a face is reached; of faces that turn up by less than kApart too.
 //
 // t = D_c + phi x o without its part along the normal: o from the centre to where the shapes touch, D_c and phi displacement and turn of the
 // centre. What rolls has t = 0 exactly, however far it turns in a step; for a corner, o = 0, t is the displacement of its material.
@@ -128,7 +128,7 @@ LINDEN_INLINE S of_lanes(const Number& number) {
   }
 }
 
-/// The four places of a rim at k: from its centre, lowest first. `up`: normal of the ground, body frame.
+/// From the centre of a rim to the place that a point of it stands for. `toward_highest`: of the disc, of any length.
 template <class S>
 LINDEN_INLINE Vec3<S> rim_arm(const GroundPoint& point, const Vec3<S>& toward_highest) {
   using std::sqrt;

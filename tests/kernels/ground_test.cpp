@@ -116,12 +116,12 @@ std::vector<Pair> random_pairs(Numbers& random) {
   on_line.gap = [=](const Vector3d& c, const Vector3d& a) { return a.cross(c - on_line.point).norm() - on_line.radius; };
   Pair& on_face = pairs[7];
   on_face.gap = [=](const Vector3d& c, const Vector3d& a) { return a.dot(c - on_face.point); };
-  const auto touching = [](const Pair& p, BlockContact contact, const Vector3d& side) {
+  const auto touching = [](const Pair& p, BlockContact contact, const Vector3d& sideways) {
     return [=](const Displacement<double>& D, Mat3<double>& force, Mat3<double>& moment) {
       force = moment = diagonal(0.0);
       const Vec3<double> a = vec(p.axis), a1 = a + turned_by(D.r, a), foot = vec(p.center - p.point);
-      const auto begin = touch_block(contact, a, vec(p.line), foot, p.radius, vec(side));
-      const auto end = touch_block(contact, a1, vec(p.line), foot + moved_by(D, p.center), p.radius, vec(side));
+      const auto begin = touch_block(contact, a, vec(p.line), foot, p.radius, vec(sideways));
+      const auto end = touch_block(contact, a1, vec(p.line), foot + moved_by(D, p.center), p.radius, vec(sideways));
       return GapChange<double>{end.gap - begin.gap, 0.5 * (begin.gradient() + end.gradient()), end.gradient()};
     };
   };

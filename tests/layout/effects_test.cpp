@@ -319,7 +319,7 @@ TEST_CASE("effects that make no sense are refused, each by its place", "[effects
   const HeightField field{
       .columns = 2, .rows = 2, .spacing_x = 1, .spacing_y = 1, .origin_x = 0, .origin_y = 0, .heights = {0, 0, 0}};
   refused([&](Effects& e) { e.ground = Ground{.terrain = field}; }, "ground.terrain", "it has 3 heights");
-  refused([&](Effects& e) { e.ground = Ground{.contacts = {{{2, {}, 0}, {1, {}, 0}}, {}}}; }, "ground", "in no order");
+  refused([&](Effects& e) { e.ground = Ground{.contacts = {{{2, {}, 0}, {1, {}, 0}}, {}, {}}}; }, "ground", "in no order");
 }
 
 TEST_CASE("what may be named twice may be", "[effects]") {
