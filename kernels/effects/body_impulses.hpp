@@ -26,7 +26,7 @@ namespace linden {
 #define LINDEN_BODY_IMPULSES_FIELDS(FIELD)                                                                \
   FIELD(Scalar, pose, 12, slots, "T: body -> world at q; rotation row by row, shift [m]")                \
   FIELD(Scalar, given, 6, slots, "h x impulses of both ends, body frame at k; moment, force")            \
-  FIELD(Scalar, uneven, 6, slots, "h x impulses of the beginning less half of both ends, likewise")      \
+  FIELD(Scalar, uneven, 6, slots, "h x impulses times s - 1/2, where they act at the end, likewise")     \
   FIELD(Scalar, pull, 36, slots, "what K grows by, as a Mat6; zero of bodies that no effect touches")
 
 template <class Scalar>
@@ -40,12 +40,13 @@ void clear_body(BodyImpulses<S>& sum, Index i) {
   for (int k = 0; k < 36; ++k) sum.pull(i, k) = S(0.0);
 }
 
-/// h^2 x wrenches of the beginning and of both ends.
+/// h^2 x wrenches of the beginning and of both ends; uneven: (s - 1/2) x both, where it acts at the end of the step.
 template <class S>
-LINDEN_INLINE void add_wrenches(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const Wrench<S>& begin, const Wrench<S>& both) {
+LINDEN_INLINE void add_wrenches(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const Wrench<S>& begin, const Wrench<S>& both,
+                                const Wrench<S>& uneven) {
   store(impulse, i, load<Wrench, S>(impulse, i) - begin);
   store(sum.given, i, load<Wrench, S>(sum.given, i) + both);
-  store(sum.uneven, i, load<Wrench, S>(sum.uneven, i) + (begin - S(0.5) * both));
+  store(sum.uneven, i, load<Wrench, S>(sum.uneven, i) + uneven);
 }
 
 /// force x h^2 at the point `arm`, which moves by `moved`.
@@ -53,7 +54,8 @@ template <class S>
 LINDEN_INLINE void add_force(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const S& share, const Vec3<S>& arm, const Vec3<S>& moved,
                              const Vec3<S>& force) {
   const Vec3<S> middle = arm + (S(1.0) - share) * moved;
-  add_wrenches(sum, impulse, i, share * Wrench<S>{cross(arm, force), force}, Wrench<S>{cross(middle, force), force});
+  add_wrenches(sum, impulse, i, share * Wrench<S>{cross(arm, force), force}, Wrench<S>{cross(middle, force), force},
+               (share - S(0.5)) * Wrench<S>{cross(arm + moved, force), force});
 }
 
 /// H x h^2 s, of a force at `arm` that depends on how the point c moves.

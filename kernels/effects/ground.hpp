@@ -590,7 +590,8 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
       return true;
     };
     const S sinks = ground.terrain ? -sqrt(dot(moved, moved)) : points.rise(k);
-    if (far(points.clearance(k) + sinks)) continue;
+    const S lowest = points.clearance(k) + sinks;
+    if (far(lowest)) continue;
     if (!motion) motion.emplace(D);
     const BodyMotion<S>& body = *motion;
     const bool rim = point.rim_radius > 0;
@@ -617,7 +618,8 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     }
     const Wrench<S> couple{scale * push.n, none}, drag{scale * cross(a, friction.drag), scale * friction.drag};
     add_force(sum, impulse, i, share, c, moved, scale * push.f);
-    add_wrenches(sum, impulse, i, share * couple + drag, couple + drag);
+    const Wrench<S> drag_at_end{scale * cross(a + moved, friction.drag), scale * friction.drag};
+    add_wrenches(sum, impulse, i, share * couple + drag, couple + drag, (share - half) * couple + half * drag_at_end);
     const Wrench<S> end = [&] {
       const Vec3<S> f = transpose_times(body.R, meeting.gap.end.f);
       return Wrench<S>{cross(c, f) + transpose_times(body.R, meeting.gap.end.n), f};
@@ -628,7 +630,11 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
       add_pull(sum, i, c, c, body.R, bend);
     }
 
-    store(points.slip, k, meeting.slip.along);
+    // in a lane that is far its own way, whatever others are, the slip stays what it was: states are judged by it
+    const auto near = gap < zero || (lowest < zero && gap + meeting.gap.rise < zero);
+    const auto slip = load<Vec3, S>(points.slip, k);
+    const Vec3<S>& along = meeting.slip.along;
+    store(points.slip, k, Vec3<S>{select(near, along.x, slip.x), select(near, along.y, slip.y), select(near, along.z, slip.z)});
     points.closed(k) = normal.closed;
     points.load(k) = friction.load;
     points.push(k) = normal.push();

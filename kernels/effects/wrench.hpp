@@ -52,7 +52,8 @@ void wrench_map(Wrenches<S>& wrenches, std::size_t first, std::size_t last, cons
     }
     const Wrench<S> begin{half * (moment + cross(a, force)), half * force};
     const Wrench<S> end{half * (end_moment + cross(a + moved, end_force)), half * end_force};
-    add_wrenches(sum, impulse, i, scale * begin, scale * (begin + end));
+    const Vec3<S> none{S(0.0), S(0.0), S(0.0)};
+    add_wrenches(sum, impulse, i, scale * begin, scale * (begin + end), Wrench<S>{none, none});
     wrenches.work(static_cast<Index>(k)) = half * (dot(force + end_force, moved) + dot(moment + end_moment, turn));
   }
 }

@@ -368,6 +368,9 @@ class Reader {
     if (!low && !high) return;
     const double on = mean[2][row], slack = 2 * std::abs(mean[3][row] - on) + known_[row];
     if (std::abs(v[row] - on) <= slack) return;
+    // what rested there and is set in motion within the step that comes reads something between
+    const double into = low ? -mean[1][row] : mean[1][row];
+    if (into <= known_[row] && v[row] >= std::min(mean[1][row], on) - slack && v[row] <= std::max(mean[1][row], on) + slack) return;
     found.add(Check::rest, fmt::format("{}: speed on a limit", who_),
               fmt::format("{}: {} is on its limit and reads {:.6g} per s; expected {:.6g}, with which it goes on, within {:.2g}",
                           at(scene_, node), row_name(scene_, row), v[row], on, slack));
