@@ -324,6 +324,7 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
     const bool to_the_end = whole && creep == std::end(kSoftCreeps)[-1];
     displacement_map(model_.tree, work_.motion, work_.delta);
     effects_.soften(creep, work_.delta);
+    spread_mimics<double>(sweeps_.mimics(), work_.delta);
     now = sweeps_.evaluate(true, report);
     norm = now.norm;
     for (int k = 0; k < kMostSoftCorrections; ++k) {
@@ -336,14 +337,14 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
       }
       if (to_the_end ? converged(now, norm, h) || sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons) : settled) break;
       std::ranges::copy(work_.innovation.flat(), before_innovation_.flat().begin());
-      const double slope_before = sweeps_.slope_along(before_innovation_);
+      const double slope_before = sweeps_.slope_at_begin();
       now = sweeps_.solve_and_correct(report);
       double taken = 1;
       for (int cut = 0; cut < kMaxBacktracks; ++cut) {
         double share = 0.5;
         if (now.usable()) {
           norm = now.norm;
-          const double slope = sweeps_.slope_along(before_innovation_);
+          const double slope = sweeps_.slope_at_end(before_innovation_);
           if (slope > -kSteepest * slope_before) break;
           share = std::clamp(slope_before / (slope_before - slope), 0.1, 0.9);
         }
@@ -423,7 +424,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
   const auto revised = [&]([[maybe_unused]] bool settled) {
     if constexpr (kEffects) {
       const bool revises = effects_.plan().revises;
-      if (revises && sweeps_.one_pass() && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
+      if (revises && sweeps_.has_slopes() && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
         // at first only to find the states; where they still do not settle the step stays with friction smooth below the least creep
         const bool whole = revisions == kMostRevisions;
         approach_softly(now, norm, h, whole, report);

@@ -425,6 +425,14 @@ Evaluated TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
   return evaluate_motions(report, false, false, motions, nothing);
 }
 
+/// The residual along a correction.
+template <bool kEffects>
+double TreeSweeps<kEffects>::along(const Field<double>& correction) const {
+  double sum = 0;
+  for (Index row = 0; row < correction.rows(); ++row) sum += work_.residual(row) * correction(row);
+  return sum;
+}
+
 template <bool kEffects>
 double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before) const {
   double sum = 0;

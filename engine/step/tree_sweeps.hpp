@@ -104,11 +104,16 @@ class TreeSweeps {
   /// The residual of each joint as its solve left it [kg m^2, kg m]; with no ties, the innovation.
   Field<double>& left() { return one_pass_ ? work_.innovation : work_.residual; }
   const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
-  bool one_pass() const { return one_pass_; }
   /// d^-1 of each joint, of one that is tied that of its coordinate: how far an impulse moves it.
   const Field<double>& yields() { return ties_.empty() ? work_.joint_inverse : ties_.yields(work_.joint_inverse); }
-  /// u.(d^-1 u_before), summed over the joints, for the innovation of another evaluation with the same factor.
-  double slope_along(const Field<double>& innovation_before) const;
+  /// Whether slopes along corrections are known: by Newton's method with its energy norm.
+  bool has_slopes() const { return options_.solver == Solver::newton && options_.stop == StopTest::energy; }
+  /// r.(A^-1 r_before): the residual along a correction, r_before its own. Before the correction is made; after it, for the innovation there
+  /// was before. Without ties the sum of u.(d^-1 u_before) over the joints, with the same factor.
+  double slope_at_begin() const { return ties_.empty() ? slope_along(work_.innovation) : along(work_.increment); }
+  double slope_at_end(const Field<double>& innovation_before) const {
+    return ties_.empty() ? slope_along(innovation_before) : along(work_.applied);
+  }
   /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
   /// beside the motion, or beside what gravity alone would do to it where all is at rest (fall).
   bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons);
@@ -163,6 +168,8 @@ class TreeSweeps {
   double pass_residual();
   void pass_down();
   double momenta_of_delta(Field<double>& momenta);
+  double slope_along(const Field<double>& innovation_before) const;
+  double along(const Field<double>& correction) const;
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
   Gains<double> mass_gains() { return holds_ ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
