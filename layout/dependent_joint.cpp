@@ -164,7 +164,10 @@ class Articulated {
       const Body& body = at(i);
       Vector6d passed = body.impulse;
       if (moves(i, leader)) passed += body.yielding * body.S * share(i);
-      if (!is_tied(i)) passed -= body.gain.transpose() * (body.S.transpose() * body.impulse);
+      if (!is_tied(i)) {
+        const Eigen::VectorXd felt = body.S.transpose() * body.impulse;
+        for (Eigen::Index k = 0; k < felt.size(); ++k) passed -= felt[k] * body.gain.row(k).transpose();
+      }
       at(tree_.parent(i)).impulse += body.to_child.transpose() * passed;
     }
     std::vector<double> felt(bodies_.size(), 0.0);  // by leader
@@ -174,7 +177,7 @@ class Articulated {
       if (is_tied(i)) {
         if (moves(i, leader)) body.motion += body.S * share(i);
         felt[static_cast<std::size_t>(leader_[static_cast<std::size_t>(i)])] +=
-            share(i) * (body.S.transpose() * (body.yielding * body.motion + body.impulse))(0);
+            share(i) * body.S.col(0).dot(body.yielding * body.motion + body.impulse);
       } else {
         const Eigen::MatrixXd d = body.S.transpose() * body.yielding * body.S;
         body.motion -= body.S * (body.gain * body.motion + d.ldlt().solve(Eigen::MatrixXd(body.S.transpose() * body.impulse)));
@@ -191,7 +194,7 @@ class Articulated {
   double felt_one_by_one(Index leader) {
     double sum = 0;
     for (Index i = 1; i < tree_.shape.slots; ++i) {
-      if (moves(i, leader)) sum += share(i) * share(i) * (at(i).S.transpose() * at(i).held * at(i).S)(0);
+      if (moves(i, leader)) sum += share(i) * share(i) * at(i).S.col(0).dot(at(i).held * at(i).S.col(0));
     }
     return sum;
   }
