@@ -136,10 +136,8 @@ class TreeSweeps {
   /// See Stepper.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
   /// At the end of a step with effects: what velocities are read from beside p.
-  void end_reading()
-    requires kEffects
-  {
-    effects_.end_reading(*constants_, work_.placement, true, work_.impulse, work_.increment);
+  void end_reading() {
+    if constexpr (kEffects) effects_.end_reading(*constants_, work_.placement, true, work_.impulse, work_.increment);
   }
 
  private:

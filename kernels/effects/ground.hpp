@@ -289,7 +289,8 @@ S find_ground(const GroundPlan& plan, const Field<S, 12>& pose, GroundPoints<S>&
     potential = potential + as<S>(0.5 * ground.stiffness) * weight * depth * depth;
   };
   const Index count = static_cast<Index>(plan.points.size());
-  for (Index k = 0; k < count;) {
+  Index k = 0;
+  while (k < count) {
     const GroundPoint& first = plan.points[static_cast<std::size_t>(k)];
     const auto T = load<Placement, S>(pose, first.slot);
     const Vec3<S> c = spread3<S>(first.center), x = T.R * c + T.p;

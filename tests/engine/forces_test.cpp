@@ -418,7 +418,7 @@ TEST_CASE("a humanoid that starts with its joints at and beyond all their limits
     });
     batch.step(20);
     CHECK(batch.summary().frozen == 0);
-    for (const std::uint64_t seed : {3, 4, 5, 29, 60, 139, 143, 1059}) {
+    for (const std::uint64_t seed : {3u, 4u, 5u, 29u, 60u, 139u, 143u, 1059u}) {
       random_start(simulation, seed, 1);
       const double energy = simulation.energy().total();
       for (int step = 0; step < 30; ++step) {
