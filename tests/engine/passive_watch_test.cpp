@@ -1,0 +1,79 @@
+// Effects that can only take energy are watched: one that gives is named, with the place, the time and the amount.
+#include "engine/passive_watch.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "engine/drift.hpp"
+#include "scenes.hpp"
+
+namespace linden {
+namespace {
+
+EffectAccount step(double friction, double ground, double kinetic = 1) {
+  EffectAccount account;
+  account.work.friction = friction;
+  account.work.ground = ground;
+  account.friction.see(1, friction);
+  account.ground.see(2, ground);
+  account.kinetic = kinetic;
+  return account;
+}
+
+}  // namespace
+
+TEST_CASE("a passive effect that gives is told once, with joint or body, time and the most it gave") {
+  const Model model = chain(3);
+  PassiveWatch watch(model, Effects{});
+  watch.add(step(0.5, 0.2), 0.001);
+  watch.add(step(-0.005, 0.1), 0.002);  // what second order leaves: under a hundredth of what went to and fro
+  CHECK(watch.gifts().empty());
+  watch.add(step(0.1, -0.2), 0.003);
+  REQUIRE(watch.gifts().size() == 1);
+  watch.add(step(0.1, -0.3), 0.004);
+  watch.add(step(0.1, 0.4), 0.005);
+  REQUIRE(watch.gifts().size() == 1);
+  const PassiveGift& gift = watch.gifts().front();
+  CHECK(gift.effect == "ground");
+  CHECK(gift.where == "body \"" + model.names.body[2] + "\"");
+  CHECK(gift.time == 0.003);
+  CHECK(gift.amount == Approx(0.5));
+  CHECK_THAT(describe(gift), Catch::Contains("effects.ground gave 0.5 J") && Catch::Contains("0.003 s"));
+  watch.add(step(-0.9, 0.1), 0.006);
+  REQUIRE(watch.gifts().size() == 2);
+  CHECK(watch.gifts()[1].where == "joint \"" + model.names.velocity[1] + "\"");
+}
+
+TEST_CASE("what a gift is measured by does not vanish as things come to rest") {
+  const Model model = chain(2);
+  PassiveWatch watch(model, Effects{});
+  watch.add(step(1, 0, 2), 0.001);
+  for (int k = 0; k < 100; ++k) watch.add(step(-1e-5, 0, 1e-20), 0.002);
+  CHECK(watch.gifts().empty());
+}
+
+TEST_CASE("drag gives where there is a wind, and may not in still air") {
+  const Model model = chain(2);
+  Effects windy;
+  windy.wind = {1, 0, 0};
+  EffectAccount account;
+  account.work.drag = -1;
+  account.kinetic = 0.1;
+  for (const bool wind : {false, true}) {
+    PassiveWatch watch(model, wind ? windy : Effects{});
+    watch.add(account, 0.001);
+    CHECK(watch.gifts().size() == (wind ? 0u : 1u));
+  }
+}
+
+TEST_CASE("what went to and fro is not only kinetic energy") {
+  EnergyDrift drift(10);
+  drift.add(0, {0, 5});
+  drift.add(1, {0, 3}, 2, 0);  // let down slowly
+  drift.add(2, {0, 3}, 2.5, 0.5);
+  CHECK(drift.scale() == 0);
+  CHECK(drift.exchanged() == 2.5);
+  CHECK(drift.band() == 0);
+  CHECK(drift.first_change() == 0);
+}
+
+}  // namespace linden
