@@ -61,6 +61,13 @@ LINDEN_INLINE S at_each_time(const LaneTimes<S>& times, const Function& f) {
   }
 }
 
+/// How far a solve is when states are revised: its residual is small; it is solved; it has been revised so often that of what sticks too
+/// hard one alone begins to slide; and so often that of limits too one alone changes.
+template <class Mask>
+struct Revision {
+  Mask near, solved, late, last;
+};
+
 template <class S>
 class EffectSweeps {
  public:
@@ -203,27 +210,28 @@ class EffectSweeps {
     if (!plan_.effects.ball_springs.empty()) ball_spring_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, target);
   }
 
-  /// States that belong to the solution so far. `settled`: the residual is small, so that impulses that hold can be judged. delta is
-  /// changed where a joint comes to rest. Of what sticks too hard all start to slide, or, where `one_by_one`, that alone which does
-  /// most: slower, and hardly ever in a circle. Softly only limits have states to revise. Returns in which instances
-  /// something changed: the factor is out of date there.
+  /// States that belong to the solution so far. Where the residual is small impulses that hold can be judged. delta is changed where a joint
+  /// comes to rest. Of what sticks too hard all start to slide, or late that alone which does most: slower, and hardly ever in a circle.
+  /// Softly only limits have states to revise. Returns in which instances something changed: the factor is out of date there.
   template <class Mask>
-  auto revise(const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
+  auto revise(const Field<S>& residual, const Revision<Mask>& now, Field<S>& delta) {
     using std::max;
     auto changed = S(0.0) > S(1.0);
-    if (soft()) return revise_limits(limits_, residual, settled, one_by_one, delta);
+    // limits that do not settle soon are judged at the solution: nearby, what holds a light joint is lost in what the others still lack
+    const Mask limits_settled = now.solved || (now.near && !now.late);
+    if (soft()) return revise_limits(limits_, residual, limits_settled, now.last, delta);
     S least(0.0);
-    if (any(one_by_one)) {
+    if (any(now.late)) {
       const S overload = max(friction_overload(frictions_, h_, residual), ground_overload(points_));
-      least = select(one_by_one, overload, least);
+      least = select(now.late, overload, least);
     }
     if (plan_.joints) {
       changed = revise_servos(servos_, plan_.q_row, h_, *q_, delta);
-      changed = revise_friction(frictions_, h_, residual, settled, least, delta) || changed;
-      changed = revise_limits(limits_, residual, settled, one_by_one, delta) || changed;
+      changed = revise_friction(frictions_, h_, residual, now.near, least, delta) || changed;
+      changed = revise_limits(limits_, residual, limits_settled, now.last, delta) || changed;
       if (any(changed)) assemble();
     }
-    if (!plan_.ground.points.empty()) changed = revise_ground(points_, settled, least) || changed;
+    if (!plan_.ground.points.empty()) changed = revise_ground(points_, now.near, least) || changed;
     return changed;
   }
 

@@ -44,7 +44,7 @@ namespace linden {
 inline constexpr int kMostCorrections = 8;
 
 /// With effects, whose states may take some corrections to settle; from some on they are revised one by one.
-inline constexpr int kMostEffectCorrections = 24, kBulkEffectCorrections = 8;
+inline constexpr int kMostEffectCorrections = 24, kBulkEffectCorrections = 8, kLastEffectCorrections = 18;
 
 template <class Pack, bool kOwnMasses, bool kEffects>
 class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
@@ -330,13 +330,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
       const Pack scale = now.energy + fall;
       Lanes ok = usable & L::bits(number(0.5) * norm <= tolerance_squared_ * scale);
       ok |= usable & ~ok & at_rounding_floor(norm, now.energy);
-      const bool bulk = corrections < kBulkEffectCorrections;
-      // what does not settle soon is judged at the solution: nearby, what holds a light joint is lost in what the others still lack
-      const Lanes settled = ok | (bulk ? usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale) : 0);
+      const Lanes near = ok | (usable & L::bits(number(0.5) * norm <= number(kSettledSquared) * scale));
       Lanes changed = 0;
       if (effects_->plan().revises) {
-        const Mask one_by_one = bulk ? L::mask(0) : L::mask(~Lanes{0});
-        changed = L::bits(effects_->revise(work_.innovation, L::mask(settled), one_by_one, work_.delta));
+        const auto all = [](bool yes) { return L::mask(yes ? ~Lanes{0} : 0); };
+        const Revision<Mask> revision{L::mask(near), L::mask(ok), all(corrections >= kBulkEffectCorrections), all(corrections >= kLastEffectCorrections)};
+        changed = L::bits(effects_->revise(work_.innovation, revision, work_.delta));
       }
       ok &= active & ~changed;
       Lanes given_up = active & ~ok & (~usable | (corrections == kMostEffectCorrections ? ~Lanes{0} : 0));

@@ -273,10 +273,10 @@ std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
 
 /// Whether the state of an effect changed; work_.delta then says what the motion is to be.
 template <bool kEffects>
-bool TreeStepper<kEffects>::revise_effects(bool settled, bool one_by_one)
+bool TreeStepper<kEffects>::revise_effects(const Revision<bool>& revision)
   requires kEffects
 {
-  if (!effects_.revise(sweeps_.left(), settled, one_by_one, work_.delta)) return false;
+  if (!effects_.revise(sweeps_.left(), revision, work_.delta)) return false;
   spread_mimics<double>(sweeps_.mimics(), work_.delta);  // of a coordinate that comes to hold its leader's row was set
   displacement_map(model_.tree, work_.motion, work_.delta);
   return true;
@@ -330,7 +330,7 @@ void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double
     for (int k = 0; k < kMostSoftCorrections; ++k) {
       if (!now.usable() || !std::isfinite(norm)) return;
       const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
-      if (revise_effects(settled, false)) {
+      if (revise_effects({.near = settled, .solved = false, .late = false, .last = false})) {
         now = sweeps_.evaluate(true, report);
         norm = now.norm;
         continue;
@@ -421,7 +421,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
 
   // the evaluation and factor for other states of effects, where they changed
   int revisions = 0;
-  const auto revised = [&]([[maybe_unused]] bool settled) {
+  const auto revised = [&]([[maybe_unused]] bool near, [[maybe_unused]] bool solved) {
     if constexpr (kEffects) {
       const bool revises = effects_.plan().revises;
       if (revises && sweeps_.has_slopes() && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
@@ -432,7 +432,8 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
         displacement_map(model_.tree, work_.motion, work_.delta);
       } else {
         if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision) return false;
-        if (!revise_effects(settled, revisions >= kBulkRevisions)) return false;
+        const bool late = revisions >= kBulkRevisions, last = revisions >= 2 * kBulkRevisions;
+        if (!revise_effects({.near = near, .solved = solved, .late = late, .last = last})) return false;
         report.iterations += 1;
       }
       revisions += 1;
@@ -450,9 +451,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
       return end(StepStatus::not_finite);
     }
     const bool done = at_floor || converged(now, norm, h);
-    // what does not settle soon is judged at the solution: nearby, what holds a light joint is lost in what the others still lack
-    const bool near = revisions < kBulkRevisions && 0.5 * norm <= kSettled * kSettled * now.scale;
-    if (revised(done || near)) {
+    if (revised(done || 0.5 * norm <= kSettled * kSettled * now.scale, done)) {
       at_floor = false;
       continue;
     }
@@ -465,7 +464,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
     const double before = norm;
     double taken = 1;
     norm = try_out(sweeps_.solve_and_correct(report));
-    if (revised(false)) continue;
+    if (revised(false, false)) continue;
     const bool slow = norm > kSlowProgress * kSlowProgress * before;
     const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.scale;
     at_floor = (slow && sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) ||

@@ -54,7 +54,7 @@ class TreeStepper final : public Stepper {
   bool gains_energy(const State<double>& state, int history, double h, StepReport& report);
   void begin_effects(const State<double>& state, double h)
     requires kEffects;
-  bool revise_effects(bool settled, bool one_by_one)
+  bool revise_effects(const Revision<bool>& revision)
     requires kEffects;
   void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
     requires kEffects;
