@@ -139,27 +139,26 @@ void Simulation::load(const std::string& file) {
   if (header.steps < 0 || header.steps > kMostSteps) impossible(fmt::format("{} steps", header.steps));
   if (header.history < 0 || header.history > kHistory) impossible(fmt::format("the displacements of {} steps", header.history));
   const char* next = bytes.data() + body;
+  const auto read = [&next](auto numbers) {  // a span; copy_n, as none may be there
+    const auto to = std::as_writable_bytes(std::span(numbers));
+    std::ranges::copy_n(next, static_cast<std::ptrdiff_t>(to.size()), reinterpret_cast<char*>(to.data()));
+    next += to.size();
+  };
   State<double>::each(loaded, [&](const char*, auto& field, Rows, const char*) {
-    std::memcpy(field.flat().data(), next, field.bytes());
-    next += field.bytes();
+    read(field.flat());
   });
   for (const auto& numbers : {loaded.q.flat(), loaded.p.flat(), loaded.history.flat()}) {
     const bool finite = std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
     if (!finite) impossible("a number that is not finite");
   }
   if (stage_guess) {
-    std::memcpy(stage_guess->known().data(), next, stage_guess->known().size_bytes());
-    next += stage_guess->known().size_bytes();
+    read(stage_guess->known());
     for (const std::int64_t rows : stage_guess->known()) {
       if (rows < 0 || rows > StageGuess::kRows) impossible(fmt::format("the displacements of {} steps", rows));
     }
-    std::memcpy(stage_guess->numbers().data(), next, stage_guess->numbers().size_bytes());
-    next += stage_guess->numbers().size_bytes();
+    read(stage_guess->numbers());
   }
-  for (const std::span<double> numbers : memory) {
-    std::memcpy(numbers.data(), next, numbers.size_bytes());
-    next += numbers.size_bytes();
-  }
+  for (const std::span<double> numbers : memory) read(numbers);
   state_ = loaded;
   stage_guess_ = std::move(stage_guess);
   steps_ = header.steps;
