@@ -82,4 +82,8 @@ Instance random_instance(const PlainTree& tree, std::uint64_t seed, double turn)
 
 VectorXd dense_solve(const MatrixXd& A, const VectorXd& b) { return A.partialPivLu().solve(b); }
 
+#define LINDEN_HERE
+LINDEN_RIG_SWEEPS(LINDEN_HERE, double);
+LINDEN_RIG_SWEEPS(LINDEN_HERE, Pack);
+
 }  // namespace linden

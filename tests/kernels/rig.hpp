@@ -179,6 +179,20 @@ void pass_down_mass(Rig<S>& rig) {
             rig.work.increment);
 }
 
+// Compiled once, in rig.cpp: every test of a kernel would take twice as long to compile.
+#define LINDEN_RIG_SWEEPS(PREFIX, S)                                   \
+  PREFIX template void place(Rig<S>&);                                 \
+  PREFIX template void displace(Rig<S>&);                              \
+  PREFIX template void find_momenta(Rig<S>&);                          \
+  PREFIX template void find_residual(Rig<S>&);                         \
+  PREFIX template void factor_newton(Rig<S>&, const NothingAdded&);    \
+  PREFIX template void factor_mass(Rig<S>&, const NothingAdded&);      \
+  PREFIX template void pass_up(Rig<S>&, const Field<S>&);              \
+  PREFIX template void pass_down_newton(Rig<S>&);                      \
+  PREFIX template void pass_down_mass(Rig<S>&)
+LINDEN_RIG_SWEEPS(extern, double);
+LINDEN_RIG_SWEEPS(extern, Pack);
+
 /// A field of one component as a vector, and back.
 inline VectorXd vector(const Field<double>& field) {
   return Eigen::Map<const VectorXd>(field.flat().data(), static_cast<Eigen::Index>(field.flat().size()));
