@@ -90,7 +90,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, applied, mass, targets, frictions, excess_before, reading, contacts;
+  Numbers<Real> q, p, applied, mass, targets, frictions, excess_before, reading, bend, contacts;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -114,8 +114,9 @@ struct BatchOf<Real>::Data {
     if (plan.any()) {
       excess_before.resize(rows(shape().velocities));
       reading.resize(rows(shape().velocities));
+      bend.assign(rows(shape().velocities), Real(kAnyBend));
     }
-    contacts.resize(rows(static_cast<Index>(plan.ground.points.size())));
+    contacts.resize(rows(plan.ground.kept()));
     records.resize(static_cast<std::size_t>(size));
     const std::vector<double> neutral = model->neutral();
     for_blocks([&](std::int64_t b, Worker&) {
@@ -144,7 +145,8 @@ struct BatchOf<Real>::Data {
             frictions.empty() ? nullptr : frictions.data() + at(b, count_of(plan.effects.friction)),
             excess_before.empty() ? nullptr : excess_before.data() + at(b, nv),
             reading.empty() ? nullptr : reading.data() + at(b, nv),
-            contacts.empty() ? nullptr : contacts.data() + at(b, static_cast<Index>(plan.ground.points.size())),
+            bend.empty() ? nullptr : bend.data() + at(b, nv),
+            contacts.empty() ? nullptr : contacts.data() + at(b, plan.ground.kept()),
             records.data() + b * lanes,
             static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
   }
@@ -206,15 +208,16 @@ struct BatchOf<Real>::Data {
     const BatchView<Real> to_q(q, shape().positions, lanes), to_p(p, shape().velocities, lanes);
     for (Index row = 0; row < shape().positions; ++row) to_q(i, row) = static_cast<Real>(alone.state().q(row));
     for (Index row = 0; row < shape().velocities; ++row) to_p(i, row) = static_cast<Real>(alone.state().p(row));
-    const auto clear = [&](auto& numbers, Index count_of_rows) {
+    const auto clear = [&](auto& numbers, Index count_of_rows, double to = 0) {
       using Number = typename std::remove_reference_t<decltype(numbers)>::value_type;
       const BatchView<Number> rows(numbers, count_of_rows, lanes);
-      for (Index row = 0; !numbers.empty() && row < count_of_rows; ++row) rows(i, row) = Number(0);
+      for (Index row = 0; !numbers.empty() && row < count_of_rows; ++row) rows(i, row) = static_cast<Number>(to);
     };
     clear(past, shape().velocities * kHistoryWords<Real>);
     clear(excess_before, shape().velocities);
     clear(reading, shape().velocities);
-    clear(contacts, static_cast<Index>(plan.ground.points.size()));
+    clear(bend, shape().velocities, kAnyBend);
+    clear(contacts, plan.ground.kept());
     records[static_cast<std::size_t>(i)] = {};
   }
 };
@@ -413,7 +416,7 @@ template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
   std::size_t numbers = 0;
   for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->frictions,
-                                    &data_->excess_before, &data_->reading, &data_->contacts}) {
+                                    &data_->excess_before, &data_->reading, &data_->bend, &data_->contacts}) {
     numbers += some->size();
   }
   return numbers * sizeof(Real) +

@@ -64,7 +64,7 @@ void Simulation::changed() {
 }
 
 std::vector<double> Simulation::velocities() {
-  stepper_->read_velocity(state_.p, rate_);
+  stepper_->read_velocity(state_, rate_);
   return {rate_.flat().begin(), rate_.flat().end()};
 }
 
@@ -181,11 +181,10 @@ StepReport Simulation::step_in_stages() {
   return whole;
 }
 
-Energy Simulation::energy() { return stepper_->energy_of(state_.p, rate_); }
+Energy Simulation::energy() { return stepper_->energy_of(state_, rate_); }
 
 Momentum Simulation::momentum() {
-  stepper_->read_velocity(state_.p, rate_);
-  const Wrench<double> h = stepper_->total_momentum(rate_);
+  const Wrench<double> h = stepper_->total_momentum(state_, rate_);
   return {{h.n.x, h.n.y, h.n.z}, {h.f.x, h.f.y, h.f.z}};
 }
 

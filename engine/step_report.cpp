@@ -13,6 +13,7 @@ void StepReport::add(const StepReport& more) {
   evaluations += more.evaluations;
   factorisations += more.factorisations;
   backtracks += more.backtracks;
+  blows += more.blows;
   substeps += more.substeps - 1;
   at_rounding_floor |= more.at_rounding_floor;
   residual = more.ok() ? std::max(residual, more.residual) : more.residual;

@@ -23,6 +23,7 @@ struct StepReport {
   int evaluations = 0;     // of the residual
   int factorisations = 0;  // of the Jacobian
   int backtracks = 0;      // corrections cut short
+  int blows = 0;           // impulses at which joints met limits
   int substeps = 1;        // above 1: the step, or one of the sub-steps that an order above 2 is made of, failed whole and was split
   bool at_rounding_floor = false;  // stopped above the tolerance, where rounding lets the residual fall no further
   double residual = 0;      // sqrt(1/2 r.M^-1 r / kinetic energy) at the end, the largest over sub-steps

@@ -57,6 +57,7 @@ struct Block {
   const Real* frictions;      // [frictions] forces of each instance; null: the plan's
   Real* excess_before;        // [nv] see EffectMemory; null: no effects
   Real* reading;              // [nv] likewise
+  Real* bend;                 // [nv] likewise
   Real* contacts;             // [points] how each contact point ended the last step (EffectSweeps::contact); null: none
   InstanceRecord* instances;  // [W]
   int count;                  // instances in use, 1 to W

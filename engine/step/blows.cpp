@@ -26,12 +26,13 @@ bool Blows::met(const State<double>& state) const {
     const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
     const double q = state.q(q_row(limit.row));
     const bool at_limit = limit.upper - q <= kAtLimit || q - limit.lower <= kAtLimit;
+    if (state.last_step(0) == 0 && (at_limit || std::isfinite(limit.velocity))) return true;
     if (at_limit && (limit.restitution > 0 || std::abs(sweeps_.work().delta(limit.row)) > kAtLimit)) return true;
   }
   return false;
 }
 
-double Blows::strike(State<double>& state, bool arrived, bool& struck) {
+double Blows::strike(State<double>& state, bool arrived, int& blows) {
   auto& effects = sweeps_.effects();
   const Limits<double>& limits = effects.limits();
   const Field<Index>& q_row = effects.plan().q_row;
@@ -42,38 +43,35 @@ double Blows::strike(State<double>& state, bool arrived, bool& struck) {
   }
   sweeps_.read_velocity(state.p, velocity_);
   double taken = 0;
-  bool factored = false;
+  const int before = blows;
   for (int blow = 0; blow < kMostStrikes; ++blow) {
+    const bool may_be_fast = blow > 0 || !arrived;  // else the step has seen to it
     const JointLimit* fastest = nullptr;
-    double speed = kLeastStrike;
+    double most = kLeastStrike, target = 0;  // of how much too fast a joint is; what the blow makes of its velocity
     for (const JointLimit& limit : limits.entries) {
       const double q = state.q(q_row(limit.row)), v = velocity_(limit.row);
       const double into = limit.upper - q <= kAtLimit ? v : q - limit.lower <= kAtLimit ? -v : 0;
-      if (into <= speed) continue;
-      speed = into;
+      const double over = may_be_fast ? std::abs(v) - limit.velocity : 0;
+      if (std::max(into, over) <= most) continue;
+      most = std::max(into, over);
       fastest = &limit;
+      target = into > kLeastBounce ? -limit.restitution * v : into > 0 ? 0 : std::copysign(limit.velocity, v);
     }
     if (fastest == nullptr) break;
     const Index row = fastest->row;
     std::ranges::fill(unit_.flat(), 0.0);
     unit_(row) = 1;
-    if (factored) {
+    if (blows > before) {
       sweeps_.apply_mass_inverse(unit_, response_);
     } else {
       sweeps_.velocity_of(unit_, response_);
     }
-    factored = true;
-    const double e = speed > kLeastBounce ? fastest->restitution : 0;
-    const double impulse = -(1 + e) * velocity_(row) / response_(row);
+    const double impulse = (target - velocity_(row)) / response_(row);
     taken -= impulse * (velocity_(row) + 0.5 * impulse * response_(row));
     for (Index k = 0; k < velocity_.rows(); ++k) velocity_(k) += impulse * response_(k);
-    if (e == 0) velocity_(row) = 0;
+    velocity_(row) = target;
     state.p(row) += impulse;
-    struck = true;
-  }
-  // what a blow set in motion is not held any more; what it stopped is
-  for (Index row = 0; struck && row < velocity_.rows(); ++row) {
-    if (velocity_(row) != 0) effects.release(row);
+    ++blows;
   }
   for (const JointLimit& limit : limits.entries) {
     const double q = state.q(q_row(limit.row));
@@ -82,6 +80,11 @@ double Blows::strike(State<double>& state, bool arrived, bool& struck) {
       velocity_(limit.row) = 0;
       effects.keep_still(limit.row);
     }
+  }
+  if (blows > before) {
+    // what held a joint until the blow set it in motion is not in p
+    sweeps_.momentum_of(velocity_, unit_);
+    effects.read_as(unit_, state.p);
   }
   return taken;
 }

@@ -3,7 +3,8 @@
 //
 //   v_n <- -e v_n,    p <- p + lambda e_n,    lambda = -(1 + e) v_n / (M^-1)_nn          Newton's law of impact
 //
-// v is the velocity that people read (velocity.md). Several joints at once are struck one after the other, the fastest first, until none
+// What a blow makes faster than its limit of velocity is stopped at that: v_n <- that limit. v is the velocity that motion and momenta
+// agree on (velocity.md). Several joints at once are struck one after the other, the fastest first, until none
 // moves into its limit: each blow keeps or loses energy, so all do. Without restitution, or below kLeastBounce, e is 0.
 //
 // A step in which a joint with restitution meets its limit is cut there: its length is found by false position (Illinois) on how far the
@@ -26,11 +27,12 @@ class Blows {
  public:
   Blows(TreeSweeps<true>& sweeps, Index velocities);
 
-  /// Whether the step solved last led a joint to a limit, or one that bounces is at it.
+  /// Whether the step solved last led a joint to a limit, or one that bounces is at it, or whether one starts there or
+  /// may start too fast.
   bool met(const State<double>& state) const;
   /// Strikes the joints that stand at a limit and move into it; arrived: also those that the step solved last stopped there. Of a state
-  /// whose placements are there. Returns what the blows took [J]; nothing happened where `struck` stays false.
-  double strike(State<double>& state, bool arrived, bool& struck);
+  /// whose placements are there. Returns what the blows took [J] and counts them.
+  double strike(State<double>& state, bool arrived, int& blows);
   /// The velocity after the blows.
   const Field<double>& velocity() const { return velocity_; }
 

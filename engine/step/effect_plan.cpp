@@ -20,6 +20,9 @@ constexpr double kUsualGravity = 9.81;
 /// Share of the weight of all bodies that a contact point is taken to bear at least, where its friction is made to stick.
 constexpr double kLeastLoad = 1e-2;
 
+/// Speed at which depth that the motion did not make may come to push [m/s].
+constexpr double kRecovery = 1e-3;
+
 /// Share of critical damping from which on little of a bounce is left to lose: its rebound is down to half.
 constexpr double kBouncesLittle = 0.2;
 
@@ -187,8 +190,14 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
     const auto& g = options.gravity;
     const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
     ground.frame = plane_frame(effects.ground->normal);
+    ground.recovery = h * kRecovery;
     ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
     for (const GroundPoint& point : points) ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass(point.slot)));
+  }
+
+  bends = revises;
+  for (const std::vector<double>* shares : {&damping_share, &servo_share, &drag_share}) {
+    bends = bends || std::ranges::any_of(*shares, [](double share) { return share > 0.5; });
   }
 
   std::map<Index, TouchedBody> by_slot;

@@ -17,6 +17,9 @@
 
 namespace linden {
 
+/// Of a velocity that is read: how far it may be from the mean one of the last step where nothing is known of how the motion bends [rad/s, m/s].
+inline constexpr double kAnyBend = 1e36;
+
 /// Entries of every effect on one body: [first, last) of its list.
 struct TouchedBody {
   struct Entries {
@@ -47,6 +50,7 @@ struct EffectPlan {
   bool bounces = false;  // some limit has a restitution
   bool servos_move = false;  // some servo has a table
   bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
+  bool bends = false;    // velocities are held to how the motion bends (velocity.md): something revises, or acts more at the beginning of a step
   bool any() const { return joints || bodies; }
 
   Field<Index> q_row;               // position row of a screw's velocity row

@@ -38,6 +38,10 @@ namespace linden {
 /// In the place of an impulse: the joint is held, its velocity zero. Anything above kMostRead says so.
 inline constexpr double kHeld = 1e36, kMostRead = 1e35;
 
+/// A velocity that is read is no farther from the mean one of the step that ended than this many times what that one differs from the mean
+/// of the step before it. Half as much is what a steady acceleration makes.
+inline constexpr double kMostBend = 1.5;
+
 /// Numbers in a Scalar.
 template <class S>
 inline constexpr std::size_t kLanesOf = sizeof(S) / sizeof(typename ElementOf<S>::type);
@@ -96,7 +100,7 @@ class EffectSweeps {
       limits_.entries = effects.limits;
       for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
     }
-    for (Field<S>* field : {&excess_, &excess_before_, &reading_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
+    for (Field<S>* field : {&excess_, &excess_before_, &reading_, &bend_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
     if (plan.rotor.rows() > 0) {
       rotors_.allocate(plan.rotor.rows());
       for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
@@ -141,7 +145,8 @@ class EffectSweeps {
   void with_reading(const Action& action) const {
     action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
   }
-  Index contacts() const { return points_.slides.rows(); }
+  /// How many numbers contact points keep from step to step.
+  Index contacts() const { return plan_.ground.kept(); }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
   /// To be written between steps; not a number: the target is that of the servo's table.
@@ -237,15 +242,24 @@ class EffectSweeps {
 
   /// What the next step wants to know of this one: where contact points stick and how they moved, and what velocities are read with.
   auto memory() {
-    return std::array{points_.closed.flat(), points_.slides.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
-                      excess_before_.flat(), reading_.flat()};
+    return std::array{points_.closed.flat(), points_.slides.flat(), points_.bore.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
+                      excess_before_.flat(), reading_.flat(), bend_.flat()};
   }
   Field<S>& excess_before() { return excess_before_; }
   Field<S>& reading() { return reading_; }
+  Field<S>& bend() { return bend_; }
 
-  /// The same of contact points alone, one number each: 0 apart, 1 sticks, 2 slides.
-  S contact(Index k) const { return points_.closed(k) * (S(1.0) + points_.slides(k)); }
+  /// The same of contact points alone, a number each: 0 apart, 1 sticks, 2 slides; on a terrain another, what it bore.
+  S contact(Index k) const {
+    const Index count = points_.slides.rows();
+    return k < count ? points_.closed(k) * (S(1.0) + points_.slides(k)) : points_.bore(k - count);
+  }
   void set_contact(Index k, const S& contact) {
+    const Index count = points_.slides.rows();
+    if (k >= count) {
+      points_.bore(k - count) = contact;
+      return;
+    }
     points_.closed(k) = select(contact > S(0.5), S(1.0), S(0.0));
     points_.slides(k) = select(contact > S(1.5), S(1.0), S(0.0));
   }
@@ -302,23 +316,41 @@ class EffectSweeps {
   }
 
   /// At the end of a step, once the bodies are where it leaves them: what velocities are read from beside p (engine/step/velocity.md).
-  /// `moves`: in which instances. scratch, projected: 6 x n, nv.
+  /// `moves`: in which instances. before: displacement of the step before, as long as this one, where that is `known`. scratch, projected:
+  /// 6 x n, nv.
   template <class Element, class Mask>
-  void end_reading(const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Mask& moves, Field<S, 6>& scratch,
-                   Field<S>& projected) {
-    const S most = as<S>(kMostRead), zero(0.0);
+  void end_reading(const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Mask& moves, const Field<S>& delta,
+                   const Field<S>& before, const Mask& known, Field<S, 6>& scratch, Field<S>& projected) {
+    using std::abs;
+    const S most = as<S>(kMostRead), zero(0.0), rate = as<S>(kMostBend) / h_, any = as<S>(kAnyBend);
     if (plan_.bodies) {
       std::ranges::copy(bodies_.uneven.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
     }
+    auto stopped = zero > zero;  // a limit has stopped a joint, and changed all velocities
     for (Index row = 0; row < reading_.rows(); ++row) {
       S read = plan_.joints ? excess_(row) : zero;
+      stopped = stopped || (read > most && delta(row) != zero);
       if (plan_.bodies) {
         read = select(read > most, read, read + lasting(projected(row), excess_before_(row)));
         excess_before_(row) = select(moves, projected(row), excess_before_(row));
       }
       reading_(row) = select(moves, read, reading_(row));
     }
+    for (Index row = 0; plan_.bends && row < bend_.rows(); ++row) {
+      const S bend = select(known && !stopped, rate * abs(delta(row) - before(row)), any);
+      bend_(row) = select(moves, bend, bend_(row));
+    }
+  }
+  /// A velocity that was read so, no farther from the mean one of the last step than the motion bends, and no faster than a limit
+  /// of velocity lets it be.
+  LINDEN_INLINE S within_bend(Index row, const S& velocity, const S& mean) const {
+    using std::max;
+    using std::min;
+    const S v = min(max(velocity, mean - bend_(row)), mean + bend_(row));
+    if (plan_.fastest.rows() == 0) return v;
+    const S fastest = as<S>(plan_.fastest(row));
+    return min(max(v, -fastest), fastest);
   }
   /// Adds to p what velocities are read from beside it, and prepares with_reading.
   void begin_reading(Field<S>& p) {
@@ -329,19 +361,26 @@ class EffectSweeps {
       reading_stiffness_(row) = select(held, infinite, rotors_.rows() > 0 ? rotors_(row) : zero);
     }
   }
-  /// A joint that was held has been struck; one that was struck has come to rest.
+  /// A joint that was held is to be struck; one that was struck has come to rest.
   void release(Index row) {
     if (reading_(row) > S(kMostRead)) reading_(row) = S(0.0);
   }
   void keep_still(Index row) { reading_(row) = S(kHeld); }
+  /// A blow has changed all velocities to those of these momenta.
+  void read_as(const Field<S>& momentum, const Field<S>& p) {
+    for (Index row = 0; row < p.rows(); ++row) reading_(row) = momentum(row) - p(row);
+    std::ranges::fill(bend_.flat(), S(kAnyBend));
+  }
   const Limits<S>& limits() const { return limits_; }
   /// The state is another's from now on.
   void forget() {
     const auto clear = [](auto& field) { std::ranges::fill(field.flat(), S(0.0)); };
     clear(excess_before_);
     clear(reading_);
+    std::ranges::fill(bend_.flat(), as<S>(kAnyBend));
     clear(points_.closed);
     clear(points_.slides);
+    clear(points_.bore);
   }
 
   /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
@@ -417,7 +456,7 @@ class EffectSweeps {
     on(plan_.bodies, "world_placement_down", [=, this, &work] { world_placement_down(tree_, work.placement, bodies_.pose); });
     on(points, "find_ground", [=, this] { find_ground(plan_.ground, bodies_.pose, points_); });
     on(true, "end_reading",
-       [=, this, &constants, &work, &end] { end_reading(constants, work.placement, S(0.0) < S(1.0), work.impulse, end); });
+       [=, this, &constants, &work, &end] { end_reading(constants, work.placement, S(0.0) < S(1.0), work.delta, work.delta, S(0.0) < S(1.0), work.impulse, end); });
   }
   /// Taken from the work of the ground once the potential at the end is known.
   S ground_stored() const { return ground_potential_ - ground_before_; }
@@ -463,6 +502,7 @@ class EffectSweeps {
   Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
   Field<S> excess_before_;     // the same of bodies, seen from the joints, of the step before
   Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held
+  Field<S> bend_;              // how far a velocity may be from the mean one of the last step
   Field<S> reading_stiffness_;
   const Field<S>* q_ = nullptr;
   Field<S> rotors_;  // armature of every row; no rows without

@@ -59,7 +59,7 @@ void InstanceStepper::set_velocities(std::span<const double> v) {
 
 Energy InstanceStepper::observe() {
   refresh();
-  return stepper_->energy_of(state_.p, rate_);
+  return stepper_->energy_of(state_, rate_);
 }
 
 void normalise_positions(const Model& model, std::span<double> q) {

@@ -38,6 +38,7 @@ class LaneEffects {
     load(block.frictions, sweeps_.friction_forces());
     load(block.excess_before, sweeps_.excess_before());
     load(block.reading, sweeps_.reading());
+    load(block.bend, sweeps_.bend());
     for (Index k = 0; block.contacts != nullptr && k < sweeps_.contacts(); ++k) {
       sweeps_.set_contact(k, L::load(block.contacts + k * W));
     }
@@ -46,6 +47,7 @@ class LaneEffects {
     for (Index row = 0; row < end_.rows(); ++row) {
       L::store(sweeps_.excess_before()(row), block.excess_before + row * W);
       L::store(sweeps_.reading()(row), block.reading + row * W);
+      L::store(sweeps_.bend()(row), block.bend + row * W);
     }
   }
 
@@ -62,10 +64,8 @@ class LaneEffects {
       known |= block.instances[l].displacements > 0 ? 1u << l : 0u;
     }
     constexpr int words = kHistoryWords<Real> * W;
-    for (Index row = 0; sweeps_.plan().joints && row < before_.rows(); ++row) {
-      std::array<Real, W> each;
-      for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<Real>(block.past + row * words + l);
-      before_(row) = L::load(each.data());
+    for (Index row = 0; row < before_.rows(); ++row) {
+      before_(row) = last_displacement(block.past + row * words);
     }
     known_ = known;
     sweeps_.begin(time, h, q, before_, L::mask(known), false, work.delta);
@@ -92,6 +92,12 @@ class LaneEffects {
     return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, false>{stiffness, pull});
   }
 
+  /// Velocities no farther from the mean ones of the last step than the motion bends.
+  void follow_motion(const Block<Real>& block, const Pack& rate, Field<Pack>& v) const {
+    constexpr int words = kHistoryWords<Real> * W;
+    for (Index row = 0; row < v.rows(); ++row) v(row) = sweeps_.within_bend(row, v(row), rate * last_displacement(block.past + row * words));
+  }
+
   /// What effects keep of lane l, for it to be stepped alone; and of the step that it took so. Contact points ended the step before as the
   /// block has them, whatever lanes that are solved together have made of them since.
   void take_out(const Block<Real>& block, int l, InstanceStepper& alone) {
@@ -99,6 +105,7 @@ class LaneEffects {
     for (std::size_t row = 0; row < memory.reading.size(); ++row) {
       memory.excess_before[row] = static_cast<double>(L::lane(sweeps_.excess_before()(static_cast<Index>(row)), l));
       memory.reading[row] = static_cast<double>(L::lane(sweeps_.reading()(static_cast<Index>(row)), l));
+      memory.bend[row] = static_cast<double>(L::lane(sweeps_.bend()(static_cast<Index>(row)), l));
     }
     for (Index k = 0; k < sweeps_.contacts(); ++k) alone.set_contact(k, static_cast<double>(block.contacts[k * W + l]));
   }
@@ -107,6 +114,7 @@ class LaneEffects {
     for (std::size_t row = 0; row < memory.reading.size(); ++row) {
       L::set_lane(sweeps_.excess_before()(static_cast<Index>(row)), l, memory.excess_before[row]);
       L::set_lane(sweeps_.reading()(static_cast<Index>(row)), l, memory.reading[row]);
+      L::set_lane(sweeps_.bend()(static_cast<Index>(row)), l, memory.bend[row]);
     }
     for (Index k = 0; k < sweeps_.contacts(); ++k) block.contacts[k * W + l] = static_cast<Real>(alone.contact(k));
   }
@@ -125,10 +133,16 @@ class LaneEffects {
   template <class Element>
   void add_end(const BodyConstants<Element>& constants, const Mask& moves, Workspace<Pack>& work, Field<Pack>& p) {
     for (Index row = 0; sweeps_.plan().joints && row < p.rows(); ++row) p(row) = select(moves, p(row) + end_(row), p(row));
-    sweeps_.end_reading(constants, work.placement, moves, work.impulse, work.increment);
+    sweeps_.end_reading(constants, work.placement, moves, work.delta, before_, L::mask(known_), work.impulse, work.increment);
   }
 
  private:
+  static Pack last_displacement(const std::uint32_t* past) {
+    std::array<Real, W> each;
+    for (int l = 0; l < W; ++l) each[static_cast<std::size_t>(l)] = remembered<Real>(past + l);
+    return L::load(each.data());
+  }
+
   const Tree& tree_;
   EffectSweeps<Pack> sweeps_;
   Field<Pack> end_;     // what they add to p at the end of a step

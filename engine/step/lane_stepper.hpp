@@ -95,8 +95,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   void step(const Block<Real>& block, std::int64_t steps) override {
     load(block);
-    refresh();
     if constexpr (kEffects) effects_.load(block);
+    refresh();
     Lanes alive = 0;
     for (int l = 0; l < block.count; ++l) alive |= block.instances[l].status == StepStatus::converged ? 1u << l : 0u;
     for (std::int64_t k = 0; k < steps && alive != 0; ++k) alive = step_once(block, alive);
@@ -119,6 +119,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     Pack kinetic = number(0);
     for (Index row = 0; row < tree_.shape.velocities; ++row) {
       kinetic = kinetic + number(0.5) * p_(row) * work_.increment(row);
+    }
+    if constexpr (kEffects) effects_.follow_motion(block, number(1 / options_.step), work_.increment);
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
       L::store(work_.increment(row), velocities + row * W);
     }
     L::store(kinetic, energy);

@@ -27,7 +27,7 @@ struct Energy {
 
 /// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading).
 struct EffectMemory {
-  std::span<double> excess_before, reading;
+  std::span<double> excess_before, reading, bend;
 };
 
 class Stepper {
@@ -65,15 +65,16 @@ class Stepper {
   virtual std::vector<std::span<double>> memory() = 0;
 
   /// The velocity of the motion at the positions of the last refresh or step, see engine/step/velocity.md: M(q)^-1 p where nothing acts
-  /// but potentials; else p is read with the effects' impulses taken half at each end of the last step, and what they hold is at rest.
-  /// Returns that p.
-  virtual const Field<double>& read_velocity(const Field<double>& p, Field<double>& v) = 0;
+  /// but potentials; else p is read with the effects' impulses taken half at each end of the last step, what they hold is at rest, and no
+  /// velocity is farther from the mean one of that step than the motion bends.
+  virtual void read_velocity(const State<double>& state, Field<double>& v) = 0;
   /// p = M(q) v.
   virtual void momentum_of(const Field<double>& v, Field<double>& p) = 0;
-  /// Momentum of the whole system about the world's origin, in the world's frame, for rates v.
-  virtual Wrench<double> total_momentum(const Field<double>& v) = 0;
-  /// Of a state with the positions of the last refresh or step; rate = M^-1 p on the way.
-  virtual Energy energy_of(const Field<double>& p, Field<double>& rate) = 0;
+  /// Momentum of the whole system about the world's origin, in the world's frame, as its energy is. rate: scratch.
+  virtual Wrench<double> total_momentum(const State<double>& state, Field<double>& rate) = 0;
+  /// Of a state with the positions of the last refresh or step; rate: its velocity. The kinetic energy is that of p and of M^-1 p as they
+  /// are read, which the works of effects go with.
+  virtual Energy energy_of(const State<double>& state, Field<double>& rate) = 0;
 };
 
 /// With the effects of the plan, where it has any. Model and plan must outlive the stepper. Throws InputError for options that make no

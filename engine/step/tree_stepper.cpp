@@ -94,10 +94,11 @@ void TreeStepper<kEffects>::restore(State<double>& state) {
 template <bool kEffects>
 StepStatus TreeStepper<kEffects>::advance(State<double>& state, int& history, double h, bool another, StepReport& report) {
   if constexpr (kEffects) {
+    if (state.last_step(0) == 0) strike(state, h, false, report);
     if (effects_.plan().bounces) return advance_with_blows(state, history, h, report);
   }
   const StepStatus status = solve(state, history, h, report);
-  if (status == StepStatus::converged) finish(state, history, h, another);
+  if (status == StepStatus::converged) finish(state, history, h, another, report);
   return status;
 }
 
@@ -107,7 +108,6 @@ StepStatus TreeStepper<kEffects>::advance_with_blows(State<double>& state, int& 
   requires kEffects
 {
   constexpr double kNothingLeft = 1e-12;
-  if (state.last_step(0) == 0) strike(state, h, false);
   double left = h;
   for (int blows = 0; left > kNothingLeft * h; ++blows) {
     passable_ = blows < kMostBlows;
@@ -122,7 +122,7 @@ StepStatus TreeStepper<kEffects>::advance_with_blows(State<double>& state, int& 
       if (status != StepStatus::converged) return status;
       part = left;
     }
-    finish(state, history, part, false);
+    finish(state, history, part, false, report);
     if (part < left || blows > 0) history = 0;
     left -= part;
   }
@@ -164,13 +164,13 @@ double TreeStepper<kEffects>::time_of_blow(State<double>& state, double h, StepR
 /// Blows at a state, the last step of which was one of h. Afterwards the displacement of that step is the one that the velocity after the
 /// blows would have made of it: what works along the mean of both finds it there. Returns whether there was one.
 template <bool kEffects>
-bool TreeStepper<kEffects>::strike(State<double>& state, double h, bool arrived)
+bool TreeStepper<kEffects>::strike(State<double>& state, double h, bool arrived, StepReport& report)
   requires kEffects
 {
   if (effects_.plan().effects.limits.empty() || !blows_.met(state)) return false;
-  bool struck = false;
-  account_.work.limits += blows_.strike(state, arrived, struck);
-  if (!struck) return false;
+  const int before = report.blows;
+  account_.work.limits += blows_.strike(state, arrived, report.blows);
+  if (report.blows == before) return false;
   for (Index row = 0; row < before_.rows(); ++row) state.history(row, 0) = h * blows_.velocity()(row);
   state.last_step(0) = h;
   return true;
@@ -241,7 +241,7 @@ std::span<double> TreeStepper<kEffects>::friction_forces() {
 
 template <bool kEffects>
 EffectMemory TreeStepper<kEffects>::effect_memory() {
-  if constexpr (kEffects) return {effects_.excess_before().flat(), effects_.reading().flat()};
+  if constexpr (kEffects) return {effects_.excess_before().flat(), effects_.reading().flat(), effects_.bend().flat()};
   return {};
 }
 
@@ -497,7 +497,7 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
 
 /// The new state, from a displacement that solves the step.
 template <bool kEffects>
-void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, bool another) {
+void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, bool another, [[maybe_unused]] StepReport& report) {
   EffectAccount part;
   if constexpr (kEffects) {
     part = effects_.account(sweeps_.left(), work_.delta, before_, state.last_step(0) == h);
@@ -505,6 +505,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
   history = std::min(history + 1, kHistory);
+  const bool known = !has_stages_ && state.last_step(0) != 0;
   state.last_step(0) = h;
   if (!kEffects && another && sweeps_.can_go_on() && options_.guess == FirstGuess::extrapolation) {
     to_end_ = h;
@@ -521,8 +522,8 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   fold_mimics(sweeps_.mimics(), state.p);
   if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
   if constexpr (kEffects) {
-    sweeps_.end_reading();
-    if (strike(state, h, true)) history = 1;
+    sweeps_.end_reading(before_, known);
+    if (strike(state, h, true, report)) history = 1;
   }
 }
 
@@ -533,16 +534,32 @@ void TreeStepper<kEffects>::forget() {
 }
 
 template <bool kEffects>
-Energy TreeStepper<kEffects>::energy_of(const Field<double>& p, Field<double>& rate) {
-  const Field<double>& read = sweeps_.read_velocity(p, rate);
+void TreeStepper<kEffects>::read_velocity(const State<double>& state, Field<double>& v) {
+  sweeps_.read_velocity(state.p, v);
+  within_bend(state, v);
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::within_bend(const State<double>& state, Field<double>& v) const {
+  if constexpr (kEffects) {
+    if (state.last_step(0) == 0) return;
+    for (Index row = 0; row < v.rows(); ++row) v(row) = effects_.within_bend(row, v(row), state.history(row, 0) / state.last_step(0));
+  }
+}
+
+template <bool kEffects>
+Energy TreeStepper<kEffects>::energy_of(const State<double>& state, Field<double>& rate) {
+  const Field<double>& read = sweeps_.read_velocity(state.p, rate);
   double kinetic = 0;
-  for (Index row = 0; row < p.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
+  for (Index row = 0; row < rate.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
+  within_bend(state, rate);
   return {kinetic, sweeps_.potential()};
 }
 
 template <bool kEffects>
-Wrench<double> TreeStepper<kEffects>::total_momentum(const Field<double>& v) {
-  sweeps_.momentum_of(v, work_.increment);
+Wrench<double> TreeStepper<kEffects>::total_momentum(const State<double>& state, Field<double>& rate) {
+  sweeps_.read_velocity(state.p, rate);
+  sweeps_.momentum_of(rate, work_.increment);
   return load<Wrench, double>(work_.impulse, 0);
 }
 

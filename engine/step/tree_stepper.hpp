@@ -44,10 +44,10 @@ class TreeStepper final : public Stepper {
   double contact(Index k) const override;
   void set_contact(Index k, double contact) override;
   std::vector<std::span<double>> memory() override;
-  const Field<double>& read_velocity(const Field<double>& p, Field<double>& v) override { return sweeps_.read_velocity(p, v); }
+  void read_velocity(const State<double>& state, Field<double>& v) override;
   void momentum_of(const Field<double>& v, Field<double>& p) override { sweeps_.momentum_of(v, p); }
-  Wrench<double> total_momentum(const Field<double>& v) override;
-  Energy energy_of(const Field<double>& p, Field<double>& rate) override;
+  Wrench<double> total_momentum(const State<double>& state, Field<double>& rate) override;
+  Energy energy_of(const State<double>& state, Field<double>& rate) override;
 
  private:
   bool converged(const Evaluated& now, double norm, double h) const;
@@ -59,6 +59,7 @@ class TreeStepper final : public Stepper {
   void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
     requires kEffects;
   void know_before(const State<double>& state, double h);
+  void within_bend(const State<double>& state, Field<double>& v) const;
   double fall(double h) const;
   Evaluated first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report);
   StepStatus advance(State<double>& state, int& history, double h, bool another, StepReport& report);
@@ -66,13 +67,13 @@ class TreeStepper final : public Stepper {
     requires kEffects;
   double time_of_blow(State<double>& state, double h, StepReport& report)
     requires kEffects;
-  bool strike(State<double>& state, double h, bool arrived)
+  bool strike(State<double>& state, double h, bool arrived, StepReport& report)
     requires kEffects;
   void restore(State<double>& state);
   StepStatus solve(State<double>& state, int history, double h, StepReport& report);
   StepStatus find_root(State<double>& state, int history, double h, StepReport& report);
   bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
-  void finish(State<double>& state, int& history, double h, bool another);
+  void finish(State<double>& state, int& history, double h, bool another, StepReport& report);
 
   const Model& model_;
   Options options_;

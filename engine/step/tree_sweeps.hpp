@@ -133,11 +133,13 @@ class TreeSweeps {
   void velocity_of(const Field<double>& p, Field<double>& v);
   void apply_mass_inverse(const Field<double>& p, Field<double>& v);
   void momentum_of(const Field<double>& v, Field<double>& p);
-  /// See Stepper.
+  /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
   /// At the end of a step with effects: what velocities are read from beside p.
-  void end_reading() {
-    if constexpr (kEffects) effects_.end_reading(*constants_, work_.placement, true, work_.impulse, work_.increment);
+  void end_reading(const Field<double>& before, bool known) {
+    if constexpr (kEffects) {
+      effects_.end_reading(*constants_, work_.placement, true, work_.delta, before, known, work_.impulse, work_.increment);
+    }
   }
 
  private:

@@ -10,8 +10,11 @@
 // a bounce neither gains nor loses, and what rolls is neither driven nor held back. c' = c + (s - 1/2) h k.
 //
 // The feature of the ground that a point meets is that of the beginning of the step (kernels/terrain.hpp), the tangent plane of an edge or
-// corner that of the middle of it. Over an edge that turns down the gap to a face that has been left is less than that to the edge: energy is
-// lost, to the second order of the step, and gained to the same order where a face is reached; of faces that turn up by less than kApart too.
+// corner that of the middle of it. Where a feature takes over from another, depth is found that no motion made. It must not become energy:
+// on a terrain the points of a body store no more at the beginning of a step than they did at the end of the last one (bore), and their
+// depths are all reduced by one factor where they would; what is missing comes back at kRecovery (engine/step/effect_plan.cpp). Without this
+// one shape in two that tumbles over rough ground was given energy, a disc up to 89 J of 5; with it none more than 2 %. At a recovery of 10 mm/s
+// it was 1 % more. Energy is lost where a gap is less than it was, to the second order of the step over an edge that turns down.
 //
 // t = D_c + phi x o without its part along the normal: o from the centre to where the shapes touch, D_c and phi displacement and turn of the
 // centre. What rolls has t = 0 exactly, however far it turns in a step; for a corner, o = 0, t is the displacement of its material.
@@ -78,6 +81,8 @@ inline constexpr double kClearTilt = 1e-2;
   FIELD(Scalar, rise, 1, slots, "of the gap, likewise: what N works along [m]")                                      \
   FIELD(Scalar, opening, 6, slots, "gradient of the gap at k+1, likewise: moment, force, body frame") \
   FIELD(Scalar, place, 3, slots, "where the shapes touch at k+1, likewise, body frame [m]")           \
+  FIELD(Scalar, sunk, 1, slots, "share of stiffness x square of the depth at k+1, of the evaluation last made [m^2]") \
+  FIELD(Scalar, bore, 1, slots, "the same of the last step, -1 not in the ground, 0 nothing is known")               \
   FIELD(Scalar, rise_before, 1, slots, "of the last step [m]")                                        \
   FIELD(Scalar, slip_last, 3, slots, "t of the last step [m]")
 
@@ -276,6 +281,27 @@ void place_block(const GroundPoint& point, Index k, const Vec3<S>& center, const
   store(points.arm, k, touch_at(point, k, points, load<Vec3, S>(points.along, k), load<Vec3, S>(points.foot, k)).arm - as<S>(point.radius) * n);
 }
 
+/// Depth that the motion did not make must not become energy: the points of a body store no more at the beginning of a step than they did at
+/// the end of the last one, and what `recovery` adds.
+template <class S>
+void bear_what_was_borne(double recovery, Index first, Index last, GroundPoints<S>& points) {
+  using std::max;
+  using std::min;
+  using std::sqrt;
+  const S zero(0.0), one(1.0);
+  S borne = zero, found = zero;
+  auto unknown = zero < one;
+  for (Index k = first; k < last; ++k) {
+    borne = borne + max(points.bore(k), zero);
+    unknown = unknown && points.bore(k) == zero;
+    const S depth = max(-points.gap(k), zero);
+    found = found + points.weight(k) * depth * depth;
+  }
+  const S part = select(unknown || found == zero, one, min((sqrt(borne) + as<S>(recovery)) / sqrt(max(found, as<S>(1e-30))), one));
+  if (!any(part < one)) return;
+  for (Index k = first; k < last; ++k) points.gap(k) = select(points.gap(k) < zero, part * points.gap(k), points.gap(k));
+}
+
 /// Where the points are over the ground at the beginning of a step; potential energy of those inside [J].
 template <class S>
 S find_ground(const GroundPlan& plan, const Field<S, 12>& pose, GroundPoints<S>& points) {
@@ -318,9 +344,15 @@ S find_ground(const GroundPlan& plan, const Field<S, 12>& pose, GroundPoints<S>&
         } else {
           place_block(point, k, c, near, to_body, points);
         }
-        add_potential(k, points.weight(k));
       });
     }
+  }
+  if (ground.terrain) {
+    for (Index first = 0, last = 0; first < count; first = last) {
+      while (last < count && plan.points[static_cast<std::size_t>(last)].slot == plan.points[static_cast<std::size_t>(first)].slot) ++last;
+      bear_what_was_borne(plan.recovery, first, last, points);
+    }
+    for (k = 0; k < count; ++k) add_potential(k, points.weight(k));
   }
   return potential;
 }
@@ -568,6 +600,7 @@ template <class S>
 void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& h, double creep, const Field<S, 7>& displacement,
                 GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
   if (first == last) return;
+  using std::max;
   using std::sqrt;
   const S zero(0.0), half(0.5), one(1.0), rate = one / h, scale = h * h;
   const Ground& ground = plan.ground;
@@ -586,7 +619,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     // most points of a robot are far from the ground, in all lanes
     const auto far = [&](const S& lowest) {
       if (any(gap < zero || lowest < zero)) return false;
-      points.closed(k) = points.load(k) = points.push(k) = zero;
+      points.closed(k) = points.load(k) = points.push(k) = points.sunk(k) = zero;
       store(points.drag, k, none);
       return true;
     };
@@ -602,6 +635,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     points.rise(k) = meeting.gap.rise;
     if (far(gap + meeting.gap.rise)) continue;
 
+    const S sunk = max(-(gap + meeting.gap.rise), zero);
     const S share = as<S>(plan.share[at]), weight = ground.terrain ? points.weight(k) : one;
     const S stiff = weight * as<S>(ground.stiffness), loss = weight * (rate * as<S>(ground.damping)) + (share - half) * stiff;
     const NormalForce<S> normal = normal_force(stiff, loss, gap, meeting.gap.rise, meeting.slip.rise);
@@ -637,6 +671,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const Vec3<S>& along = meeting.slip.along;
     store(points.slip, k, Vec3<S>{select(near, along.x, slip.x), select(near, along.y, slip.y), select(near, along.z, slip.z)});
     points.closed(k) = normal.closed;
+    points.sunk(k) = weight * sunk * sunk;
     points.load(k) = friction.load;
     points.push(k) = normal.push();
     store(points.drag, k, friction.drag);
@@ -687,6 +722,7 @@ void ground_work(const GroundPlan& plan, bool known, const GroundPoints<S>& poin
 template <class S>
 void keep_ground(GroundPoints<S>& points) {
   std::ranges::copy(points.rise.flat(), points.rise_before.flat().begin());
+  for (Index k = 0; k < points.sunk.rows(); ++k) points.bore(k) = select(points.sunk(k) > S(0.0), points.sunk(k), S(-1.0));
   std::ranges::copy(points.slip.flat(), points.slip_last.flat().begin());
 }
 

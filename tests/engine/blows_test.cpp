@@ -117,6 +117,31 @@ TEST_CASE("after a blow the velocity is the one after the blow, and its work is 
   }
 }
 
+TEST_CASE("a blow leaves no joint faster than its limit of velocity, nor one that rests on a limit within it, and all is booked", "[blows]") {
+  // the second of three joints strikes; the third is thrown about by it, the first rests on its limit
+  for (const double h : {2e-4, 1e-3}) {
+    Effects effects = limited(3, 10, 0.8);
+    effects.limits[0] = {.row = 0, .lower = 0, .upper = 10};
+    effects.limits[1] = {.row = 1, .lower = -10, .upper = 0.2, .restitution = 0.8};
+    effects.limits[2].velocity = 0.3;
+    Simulation simulation(links_in_a_row(3), weightless(h), effects);
+    simulation.set_velocities(std::vector<double>{0, 1.3, 0});
+    const double before = simulation.energy().kinetic;
+    bool struck = false;
+    for (int k = 0; k < static_cast<int>(0.6 / h); ++k) {
+      const StepReport report = simulation.step();
+      REQUIRE(report.ok());
+      struck = struck || report.blows > 1;
+      const std::vector<double> v = simulation.velocities();
+      REQUIRE(std::abs(v[2]) <= 0.3);
+      REQUIRE((simulation.positions()[0] > 1e-9 || v[0] >= 0));
+      REQUIRE(simulation.energy().kinetic + simulation.effect_work().limits == Approx(before).epsilon(h / 2e-4 * 1e-3));
+    }
+    CHECK(struck);
+    CHECK(simulation.passive_gifts().empty());
+  }
+}
+
 TEST_CASE("what bounces ever lower under gravity comes to rest on its limit", "[blows]") {
   for (const double e : {0.5, 0.95}) {
     Effects effects;

@@ -8,6 +8,7 @@
 #include "engine/scene/scene_file.hpp"
 #include "folder.hpp"
 #include "models/generators.hpp"
+#include "models/random.hpp"
 #include "scenes.hpp"
 
 namespace linden {
@@ -347,6 +348,38 @@ TEST_CASE("a box and a capsule that fall across ridges and bounce are given no e
     INFO(body.name << ": " << gained[0] << ", " << gained[1]);
     CHECK(gained[0] < 5e-3);
     CHECK((gained[1] < 1e-5 || gained[1] < 0.5 * gained[0]));
+  }
+}
+
+TEST_CASE("what tumbles over rough ground is given no energy, whatever features take over from one another", "[ground]") {
+  for (const Body& body : {ball(), wheel(), capsule(), box(), can()}) {
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      Random random(seed);
+      Ground rough{.stiffness = 2e4, .damping = 100, .friction = 0.4 * static_cast<double>(seed % 3)};
+      HeightField field = along_x([](double) { return 0.0; }, -2, 2, seed % 2 == 0 ? 0.1 : 0.3);
+      field.rows = field.columns;
+      field.spacing_y = field.spacing_x;
+      field.origin_y = -2;
+      field.heights.resize(static_cast<std::size_t>(field.rows * field.columns));
+      for (double& height : field.heights) height = 0.4 * field.spacing_x * random.uniform(-1, 1);
+      rough.terrain = field;
+      const std::vector<double> turned = [&] {
+        std::vector<double> q{0.03, 0.02, 0.5, random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
+        const double length = std::hypot(std::hypot(q[3], q[4]), std::hypot(q[5], q[6]));
+        for (std::size_t k = 3; k < 7; ++k) q[k] /= length;
+        return q;
+      }();
+      Simulation tumbling = placed(body, rough, turned, {random.uniform(-4, 4), random.uniform(-4, 4), 0, 0.5, 0.3, 0});
+      double least = tumbling.energy().total(), given = 0;
+      for (int k = 0; k < 1500; ++k) {
+        run(tumbling, 1);
+        const double now = tumbling.energy().total();
+        least = std::min(least, now);
+        given = std::max(given, now - least);
+      }
+      INFO(body.name << ", seed " << seed << ": given " << given << " J of some 5 J");
+      CHECK(given < 0.03);
+    }
   }
 }
 

@@ -59,11 +59,11 @@ Simulation simulation_of(const EverydayScene& scene, double step) {
 Walk walk(const EverydayScene& scene, std::int64_t steps) {
   Simulation simulation = simulation_of(scene, scene.options.step);
   Walk result;
-  const auto keep = [&] {
+  const auto keep = [&](int blows) {
     const VectorXd v = vector_of(simulation.velocities());
-    result.nodes.push_back({vector_of(simulation.positions()), v, simulation.energy(), simulation.effect_work()});
+    result.nodes.push_back({vector_of(simulation.positions()), v, simulation.energy(), simulation.effect_work(), blows});
   };
-  keep();
+  keep(0);
   for (std::int64_t k = 0; k < steps; ++k) {
     const StepReport report = simulation.step();
     if (!report.ok()) {
@@ -71,7 +71,7 @@ Walk walk(const EverydayScene& scene, std::int64_t steps) {
       result.failure = simulation.describe(report);
       break;
     }
-    keep();
+    keep(report.blows);
   }
   return result;
 }

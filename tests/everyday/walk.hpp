@@ -27,6 +27,7 @@ struct Node {
   Eigen::VectorXd q, v;
   Energy energy;
   EffectWork work;
+  int blows = 0;  // on limits, in the step that ends there
   double balance() const { return energy.total() + work.taken() - work.given(); }
 };
 
