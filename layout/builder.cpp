@@ -70,6 +70,7 @@ class Build {
       place(link);
     }
     if (bodies_.empty()) fail("nothing moves: every joint is fixed; at least one moving joint is needed");
+    check_bodies();
     sort_bodies();
     lay_out();
     collect_shapes();
@@ -165,6 +166,17 @@ class Build {
       append(link, parent.body, joint * turned, JointKind::screw, turns ? 1 : 0, shift);
     }
     carry(at, turned.inverse());
+  }
+
+  /// Inertias are judged once all that is fixed to a body is part of it.
+  void check_bodies() const {
+    std::vector<double> reach(bodies_.size(), 0);
+    for (const Body& body : bodies_) {
+      if (body.parent < 0) continue;
+      double& farthest = reach[static_cast<std::size_t>(body.parent)];
+      farthest = std::max(farthest, body.placement.translation().norm());
+    }
+    for (std::size_t k = 0; k < bodies_.size(); ++k) check_body(bodies_[k].link, bodies_[k].inertia, reach[k], source_);
   }
 
   int last_body() const { return static_cast<int>(bodies_.size()) - 1; }

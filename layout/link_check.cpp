@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "layout/input_error.hpp"
@@ -13,11 +14,14 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
 
-/// A principal moment may be negative by this share of the largest: what rounding does to files (real robots reach 2.5e-16).
+/// A principal moment may be negative by this share of the largest, or of mass times size squared: what rounding does to files (real robots
+/// reach 2.5e-16).
 /// The triangle inequality only warns: of the 304 inertias in nine robots' files 20 break it, by 0.16 to 1.0 of their largest
 /// moment (placeholders, swapped axes), and their energy is positive all the same.
 constexpr double kNegativeSlack = 1e-6;
 constexpr double kTriangleSlack = 1e-9;
+/// No body of a robot is smaller [m]; of one whose mass lies in its joint the size is not known.
+constexpr double kSmallest = 1e-3;
 
 [[noreturn]] void fail(const std::string& source, const std::string& message) { throw InputError(source + ": " + message); }
 
@@ -58,8 +62,9 @@ void check_inertia(const LinkSpec& link, const std::string& source, std::vector<
   const double excess = (moments[2] - moments[0] - moments[1]) / largest;
   const std::string principal = fmt::format("principal moments {:.6g} {:.6g} {:.6g} kg m^2", moments[0], moments[1], moments[2]);
   if (negative > kNegativeSlack) {
-    fail(source, fmt::format("link {}: its inertia is not positive definite ({}); check the signs of its products of inertia",
-                     quoted(link.name), principal));
+    warnings.push_back(fmt::format("link {}: its inertia is not positive definite ({}); used as it is, as part of what moves with it",
+                                   quoted(link.name), principal));
+    return;
   }
   if (inertia.mass == 0) {
     warnings.push_back(fmt::format("link {} has inertia but no mass ({})", quoted(link.name), principal));
@@ -90,6 +95,23 @@ void check(const LinkSpec& link, const std::string& source, std::vector<std::str
   check_numbers(link, source);
   check_inertia(link, source, warnings);
   check_shapes(link, source);
+}
+
+void check_body(const std::string& link, const OriginInertia& inertia, double reach, const std::string& source) {
+  Matrix3d about = inertia.about_origin;
+  double size = std::max(reach, kSmallest);
+  if (inertia.mass > 0) {
+    const Vector3d center = inertia.moment / inertia.mass;
+    about -= OriginInertia::parallel_axis(inertia.mass, center);
+    size = std::max(size, center.norm());
+  }
+  if (!about.allFinite()) return;  // too large for numbers, which the builder tells
+  const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(about, Eigen::EigenvaluesOnly).eigenvalues();
+  const double scale = std::max(moments.cwiseAbs().maxCoeff(), inertia.mass * size * size);
+  if (!(moments[0] < -kNegativeSlack * scale)) return;
+  fail(source, fmt::format("link {}: its inertia, with all that is fixed to it, is not positive definite (principal moments {:.6g} {:.6g} "
+                           "{:.6g} kg m^2); check the signs of its products of inertia",
+                           quoted(link), moments[0], moments[1], moments[2]));
 }
 
 }  // namespace linden
