@@ -15,8 +15,8 @@ namespace linden {
 /// moves well.
 void check(const LinkSpec& link, const std::string& source, std::vector<std::string>& warnings);
 
-/// Throws InputError where the inertia of a body, with all that is fixed to it, is not positive. What is negative by no more than the rounding
-/// of mass times size squared is as good as zero. `reach`: from the body's joint to the farthest joint that it carries [m].
+/// Throws InputError where the inertia of a body, with all that is fixed to it, is not positive. What is negative by no more than the
+/// rounding of mass times size squared is as good as zero. `reach`: from the body's joint to the farthest joint that it carries [m].
 void check_body(const std::string& link, const OriginInertia& inertia, double reach, const std::string& source);
 
 }  // namespace linden

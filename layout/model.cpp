@@ -1,6 +1,10 @@
 #include "layout/model.hpp"
 
+#include <fmt/format.h>
+
 #include <cstring>
+
+#include "layout/input_error.hpp"
 
 namespace linden {
 namespace {
@@ -54,6 +58,13 @@ std::uint64_t Model::hash() const {
     hash.add(mimic.offset);
   }
   return hash.value();
+}
+
+void refuse_warnings(const Model& model) {
+  if (model.warnings.empty()) return;
+  const std::size_t others = model.warnings.size() - 1;
+  const std::string more = others == 0 ? "" : fmt::format(", and {} more", others);
+  throw InputError(fmt::format("{} (a warning{}; strict reading refuses them)", model.warnings.front(), more));
 }
 
 }  // namespace linden

@@ -34,4 +34,7 @@ struct Model {
   std::uint64_t hash() const;
 };
 
+/// Throws InputError with the first warning of a model that has any.
+void refuse_warnings(const Model& model);
+
 }  // namespace linden

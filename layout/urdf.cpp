@@ -182,11 +182,23 @@ LinkSpec root_spec(const Robot& robot, Base base) {
   return spec;
 }
 
+/// The model; what the builder refuses may come of a slip in a word.
+Model built(const TreeBuilder& builder, const std::string& suspect) {
+  try {
+    return builder.build();
+  } catch (const InputError& error) {
+    if (suspect.empty()) throw;
+    throw InputError(fmt::format("{} (and see {})", error.what(), suspect));
+  }
+}
+
 }  // namespace
 
-Model load_urdf(const std::string& file, Base base) { return parse_urdf(read_text(file, "a URDF file"), file, base); }
+Model load_urdf(const std::string& file, Base base, Reading reading) {
+  return parse_urdf(read_text(file, "a URDF file"), file, base, reading);
+}
 
-Model parse_urdf(const std::string& xml, const std::string& source_name, Base base) {
+Model parse_urdf(const std::string& xml, const std::string& source_name, Base base, Reading reading) {
   CheckedUrdf checked = check_urdf(xml, source_name);
   const Robot robot(checked.xml, source_name);
   TreeBuilder builder(robot->getName());
@@ -197,15 +209,24 @@ Model parse_urdf(const std::string& xml, const std::string& source_name, Base ba
     builder.add(std::move(spec));
   };
   add(root_spec(robot, base));
+  bool moves = base == Base::floating;
   for (const std::string& name : checked.joints) {
     const urdf::JointConstSharedPtr joint = robot->getJoint(name);
     const urdf::LinkConstSharedPtr link = joint ? robot->getLink(joint->child_link_name) : nullptr;
     if (!link)
       throw InputError(
           fmt::format("{}: urdfdom lost joint {}; expected plain text in names; rename it", source_name, quoted(name)));
+    moves = moves || joint->type != urdf::Joint::FIXED;
     add(spec_of(*joint, *link));
   }
-  return builder.build();
+  if (!moves) {
+    throw InputError(fmt::format("{}: nothing moves: the robot is one rigid body, fixed to the world; expected a joint that moves; let its "
+                                 "base float by --base floating",
+                                 source_name));
+  }
+  Model model = built(builder, checked.suspect);
+  if (reading == Reading::strict) refuse_warnings(model);
+  return model;
 }
 
 }  // namespace linden

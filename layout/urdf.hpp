@@ -9,7 +9,7 @@
 //   link without inertial                   massless
 //   limit, dynamics, mimic                  limits, damping and friction, mimic
 //   collision shapes                        shapes; meshes by name only, their files are not opened
-//   visuals, sensors, all else              not read
+//   visuals, sensors, all else              not read; what a reader should know of it is told (layout/urdf_vocabulary.hpp)
 //
 // A tree has one root link. With Base::fixed it is fixed to the world. With Base::floating a free joint called "base"
 // carries it, unless the file itself lets its robot float: where the root, with all that is fixed to it, has no mass
@@ -30,10 +30,14 @@ namespace linden {
 
 enum class Base : std::uint8_t { fixed, floating };
 
+/// What becomes of warnings: strict reading refuses a file that gives any.
+enum class Reading : std::uint8_t { lenient, strict };
+
 /// Reads a URDF file. Throws InputError: `file:line: what was found; what was expected; what to do`.
-Model load_urdf(const std::string& file, Base base = Base::fixed);
+Model load_urdf(const std::string& file, Base base = Base::fixed, Reading reading = Reading::lenient);
 
 /// The same from memory; `source_name` stands for the file in messages. Threads may call both at once.
-Model parse_urdf(const std::string& xml, const std::string& source_name, Base base = Base::fixed);
+Model parse_urdf(const std::string& xml, const std::string& source_name, Base base = Base::fixed,
+                 Reading reading = Reading::lenient);
 
 }  // namespace linden

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "layout/urdf_numbers.hpp"
@@ -28,6 +29,7 @@ class Writer {
     for (const UrdfLink& link : robot_.links()) write_link(link);
     for (const UrdfJoint& joint : robot_.joints()) write_joint(joint);
     printer_.CloseElement();
+    tell_limits_left_out();
     return printer_.CStr();
   }
 
@@ -98,6 +100,7 @@ class Writer {
     write_name("child", "link", robot_.link(joint.child).name);
     if (joint.is_screw() || joint.type == "planar") write_axis(owner, joint);
     if (joint.is_screw()) write_limit(owner, joint);
+    note_limits_left_out(joint);
     if (joint.type != "fixed") write_dynamics(owner, joint);
     if (joint.leader >= 0) {
       const XMLElement& mimic = *joint.element->FirstChildElement("mimic");
@@ -138,6 +141,13 @@ class Writer {
   void write_limit(const std::string& owner, const UrdfJoint& joint) {
     const XMLElement* limit = joint.element->FirstChildElement("limit");
     double lower = -kUnlimited, upper = kUnlimited;
+    std::string infinite;
+    const auto read = [&](const char* name) {
+      const double value = numbers_.one_or_infinity(owner, *limit, name);
+      if (std::isfinite(value)) return value;
+      infinite += (infinite.empty() ? "" : ", ") + std::string(name);
+      return std::copysign(kUnlimited, value);
+    };
     if (joint.type != "continuous") {
       const bool has_lower = limit && limit->FindAttribute("lower"), has_upper = limit && limit->FindAttribute("upper");
       const int line = (limit ? limit : joint.element)->GetLineNum();
@@ -148,15 +158,15 @@ class Writer {
           report_.warn(line, fmt::format("{} has no {} limit; read as 0, as the URDF standard says", owner,
                                          has_lower ? "upper" : "lower"));
         }
-        lower = numbers_.one_or(0, owner, *limit, "lower");
-        upper = numbers_.one_or(0, owner, *limit, "upper");
+        lower = has_lower ? read("lower") : 0;
+        upper = has_upper ? read("upper") : 0;
         if (lower > upper) {
-          report_.fail(
-              line,
-              fmt::format("{}: its lower limit {} is above its upper limit {}", owner, text_of(lower), text_of(upper)),
-              "lower <= upper", "exchange or correct them");
+          report_.warn(line, fmt::format("{}: its lower limit {} is above its upper limit {}; read as unlimited", owner, shown(lower),
+                                         shown(upper)));
+          lower = -kUnlimited;
+          upper = kUnlimited;
         }
-        if (lower == upper) {
+        if (lower == upper && std::abs(lower) != kUnlimited) {
           report_.warn(line,
                        fmt::format("{}: both its limits are {}; limits, where used, lock it", owner, text_of(lower)));
         }
@@ -166,14 +176,37 @@ class Writer {
     put("lower", lower);
     put("upper", upper);
     for (const char* most : {"effort", "velocity"}) {
-      const double value = limit ? numbers_.one_or(kUnlimited, owner, *limit, most) : kUnlimited;
-      if (value < 0) {
+      const double value = limit && limit->FindAttribute(most) ? read(most) : kUnlimited;
+      if (value < 0 && value != -kUnlimited) {
         report_.warn(limit->GetLineNum(),
-                     fmt::format("{}: its {} limit is {}; read as unlimited", owner, most, text_of(value)));
+                     fmt::format("{}: its {} limit is {}; read as unlimited", owner, most, shown(value)));
       }
       put(most, value < 0 ? kUnlimited : value);
     }
     printer_.CloseElement();
+    if (!infinite.empty()) {
+      report_.warn(limit->GetLineNum(), fmt::format("{}: its <limit> is infinite in {}; read as unlimited", owner, infinite));
+    }
+  }
+
+  static std::string shown(double limit) {
+    return std::abs(limit) == kUnlimited ? (limit < 0 ? "-inf" : "inf") : text_of(limit);
+  }
+
+  /// Continuous joints have no limits of position; of floating and planar ones no limit is kept.
+  void note_limits_left_out(const UrdfJoint& joint) {
+    const XMLElement* limit = joint.element->FirstChildElement("limit");
+    if (!limit || (joint.is_screw() && joint.type != "continuous") || joint.type == "fixed") return;
+    if (joint.type == "continuous" && !limit->FindAttribute("lower") && !limit->FindAttribute("upper")) return;
+    LeftOut& left_out = left_out_[joint.type];
+    if (left_out.count++ == 0) left_out = {1, limit->GetLineNum(), joint.name};
+  }
+  void tell_limits_left_out() {
+    for (const auto& [type, left_out] : left_out_) {
+      const std::string others = left_out.count == 1 ? "" : fmt::format(" (and {} more)", left_out.count - 1);
+      report_.warn(left_out.line, fmt::format("joint {}{} is {}: its {} not used", quoted(left_out.joint), others, type,
+                                              type == "continuous" ? "lower and upper limits are" : "<limit> is"));
+    }
   }
 
   void write_dynamics(const std::string& owner, const UrdfJoint& joint) {
@@ -191,7 +224,13 @@ class Writer {
     printer_.CloseElement();
   }
 
+  struct LeftOut {
+    int count = 0, line = 0;
+    std::string joint;  // the first
+  };
+
   const UrdfStructure& robot_;
+  std::map<std::string, LeftOut> left_out_;  // by the joints' type
   UrdfReport& report_;
   UrdfNumbers numbers_{report_};
   tinyxml2::XMLPrinter printer_{nullptr, true};
@@ -200,7 +239,7 @@ class Writer {
 }  // namespace
 
 CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name) {
-  UrdfReport report{source_name, {}};
+  UrdfReport report{source_name, {}, {}};
   const UrdfStructure robot(xml, report);
   CheckedUrdf result;
   result.xml = Writer(robot, report).run();
@@ -209,6 +248,7 @@ CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name) {
   }
   for (const UrdfJoint& joint : robot.joints()) result.joints.push_back(joint.name);
   result.warnings = std::move(report.warnings);
+  result.suspect = std::move(report.suspect);
   return result;
 }
 

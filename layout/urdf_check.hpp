@@ -8,15 +8,16 @@
 // The text written here has none of these: links with their <inertial>; joints with origin, parent, child, axis, limit,
 // mimic and dynamics; every number in the shortest form that reads back to the same double. Collision shapes do not pass through
 // urdfdom, which knows no capsules: they are read here (layout/urdf_shapes.hpp). Visuals, materials, sensors, transmissions and
-// unknown elements are left out unread.
+// unknown elements are left out, and what of them a reader should know is told (layout/urdf_vocabulary.hpp).
 //
 //   what the file says                              what becomes of it
 //   revolute or prismatic joint without limits      unlimited, with a warning
 //   one of lower and upper                          the other is 0, as the URDF standard has it, with a warning
 //   no effort or velocity limit, or a negative one  unlimited (negative: with a warning)
+//   an infinite limit, lower above upper            unlimited, with a warning
 //   no products of inertia ixy, ixz, iyz            0, with a warning
 //   <mimic> of a fixed, floating or planar joint    left out, with a warning
-//   limits of continuous, floating, planar joints   only the effort and velocity of continuous ones are kept
+//   limits of continuous, floating, planar joints   only the effort and velocity of continuous ones are kept; the rest is told
 //
 // Names and the tree come first (layout/urdf_structure.hpp), then the numbers, as they are written down again.
 // Everything else that is wrong throws InputError: `file:line: what was found; what was expected; what to do`.
@@ -39,6 +40,7 @@ struct CheckedUrdf {
   std::vector<std::string> joints;    // names in the order of the file, which urdfdom forgets
   std::unordered_map<std::string, std::vector<LinkShape>> shapes;  // of the links that have any
   std::vector<std::string> warnings;  // `file:line: what was found; how it is read`
+  std::string suspect;                // of a slip in a word, which later errors may come from; may be empty
 };
 
 CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name);

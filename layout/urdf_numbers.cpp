@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -35,6 +38,16 @@ double UrdfNumbers::one(const std::string& owner, const XMLElement& element, con
 
 double UrdfNumbers::one_or(double otherwise, const std::string& owner, const XMLElement& element, const char* name) const {
   return element.FindAttribute(name) ? one(owner, element, name) : otherwise;
+}
+
+double UrdfNumbers::one_or_infinity(const std::string& owner, const XMLElement& element, const char* name) const {
+  std::string word = attribute(owner, element, name).Value();
+  std::erase_if(word, [](unsigned char letter) { return std::isspace(letter) != 0; });
+  std::ranges::transform(word, word.begin(), [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (word == "inf" || word == "+inf" || word == "infinity" || word == "+infinity") return kInfinity;
+  if (word == "-inf" || word == "-infinity") return -kInfinity;
+  return one(owner, element, name);
 }
 
 std::array<double, 3> UrdfNumbers::three(const std::string& owner, const XMLElement& element, const char* name) const {

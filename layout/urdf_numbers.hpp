@@ -21,6 +21,8 @@ class UrdfNumbers {
 
   double one(const std::string& owner, const tinyxml2::XMLElement& element, const char* name) const;
   double one_or(double otherwise, const std::string& owner, const tinyxml2::XMLElement& element, const char* name) const;
+  /// A number, or an infinity, as some tools write it.
+  double one_or_infinity(const std::string& owner, const tinyxml2::XMLElement& element, const char* name) const;
   std::array<double, 3> three(const std::string& owner, const tinyxml2::XMLElement& element, const char* name) const;
 
   /// <origin> of an element, if it has one; a turn given as a quaternion is refused.

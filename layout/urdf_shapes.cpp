@@ -20,18 +20,14 @@ class Reader {
 
   std::optional<LinkShape> read(const XMLElement& collision) {
     const XMLElement* geometry = collision.FirstChildElement("geometry");
-    const XMLElement* element = geometry ? geometry->FirstChildElement() : nullptr;
-    if (!element) {
+    for (const XMLElement* element = geometry ? geometry->FirstChildElement() : nullptr; element; element = element->NextSiblingElement()) {
+      if (std::optional<CollisionShape> shape = shape_of(*element)) return LinkShape{pose_of(collision), std::move(*shape)};
+    }
+    // a shape that is not known has been told already
+    if (!geometry || !geometry->FirstChildElement()) {
       report_.warn(collision.GetLineNum(), fmt::format("{}: a <collision> holds no shape; left out", owner_));
-      return std::nullopt;
     }
-    std::optional<CollisionShape> shape = shape_of(*element);
-    if (!shape) {
-      report_.warn(element->GetLineNum(),
-                   fmt::format("{}: its collision shape <{}> is not known; left out", owner_, element->Name()));
-      return std::nullopt;
-    }
-    return LinkShape{pose_of(collision), std::move(*shape)};
+    return std::nullopt;
   }
 
  private:

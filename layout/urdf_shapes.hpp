@@ -1,11 +1,11 @@
 // layout/urdf_shapes.hpp
-// The <collision> elements of a link: an <origin> and the first shape within <geometry>.
+// The <collision> elements of a link: an <origin> and the first known shape within <geometry>.
 //
 //   <sphere radius/>  <box size/>  <cylinder radius length/>  <mesh filename scale/>     as the URDF standard has them
 //   <capsule radius length/>                                                             an extension; length without the ends
 //
-// Sizes are zero or more; a mesh may be mirrored by a negative scale. Files of meshes are not opened. Another shape, or none, is
-// left out with a warning; a number or name that is missing or wrong throws InputError, as in layout/urdf_check.hpp.
+// Sizes are zero or more; a mesh may be mirrored by a negative scale. Files of meshes are not opened. Where there is no shape the
+// <collision> is left out with a warning; a number or name that is missing or wrong throws InputError, as in layout/urdf_check.hpp.
 #pragma once
 
 #include <vector>

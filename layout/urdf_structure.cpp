@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <utility>
 
 #include "layout/input_error.hpp"
+#include "layout/urdf_vocabulary.hpp"
 #include "layout/words.hpp"
 #include "layout/xml_text.hpp"
 
@@ -63,7 +65,8 @@ void require_no_circle(const std::vector<Named>& list, const Up& up, const Found
 }  // namespace
 
 void UrdfReport::fail(int line, const std::string& found, std::string_view expected, std::string_view advice) const {
-  throw InputError(fmt::format("{}:{}: {}; expected {}; {}", source, line, found, expected, advice));
+  const std::string also = suspect.empty() ? "" : fmt::format(" (and see {})", suspect);
+  throw InputError(fmt::format("{}:{}: {}; expected {}; {}{}", source, line, found, expected, advice, also));
 }
 
 void UrdfReport::warn(int line, const std::string& message) {
@@ -72,8 +75,8 @@ void UrdfReport::warn(int line, const std::string& message) {
 
 bool UrdfJoint::is_screw() const { return type == "revolute" || type == "continuous" || type == "prismatic"; }
 
-UrdfStructure::UrdfStructure(const std::string& xml, UrdfReport& report) : report_(report) {
-  parse(xml);
+UrdfStructure::UrdfStructure(std::string xml, UrdfReport& report) : report_(report) {
+  parse(std::move(xml));
   index_names("link", links_, link_called_);
   index_names("joint", joints_, joint_called_);
   if (links_.empty()) {
@@ -85,9 +88,14 @@ UrdfStructure::UrdfStructure(const std::string& xml, UrdfReport& report) : repor
   require_leaders();
 }
 
-const char* UrdfStructure::name() const { return robot_->Attribute("name"); }
-
-void UrdfStructure::parse(const std::string& xml) {
+void UrdfStructure::parse(std::string xml) {
+  if (is_utf16(xml)) {
+    report_.fail(1, "the text is UTF-16", "UTF-8", fmt::format("convert it: iconv -f UTF-16 -t UTF-8 {} > out.urdf", report_.source));
+  }
+  if (const int line = line_not_utf8(xml); line > 0) {
+    report_.warn(line, "the text is not UTF-8; read as Latin-1 (iconv -f ISO-8859-1 -t UTF-8 converts it)");
+    xml = utf8_of_latin1(xml);
+  }
   if (const int line = line_of_crowded_element(xml); line > 0) {
     report_.fail(line, fmt::format("the element here has more than {} attributes", kMostAttributes), "an element of URDF",
                  "delete what is not one");
@@ -108,14 +116,10 @@ void UrdfStructure::parse(const std::string& xml) {
                  robot_ ? fmt::format("the outermost element is <{}>", robot_->Name()) : "the file holds no element",
                  "<robot name=\"...\">", "give a URDF file, or convert this one to URDF");
   }
-  if (!robot_->Attribute("name")) {
-    report_.fail(robot_->GetLineNum(), "<robot> has no name", "<robot name=\"...\">", "name the robot");
-  }
-  for (const XMLElement* child = robot_->FirstChildElement(); child; child = child->NextSiblingElement()) {
-    if (!std::string_view(child->Name()).starts_with("xacro:")) continue;
-    report_.fail(child->GetLineNum(), fmt::format("the macro <{}>", child->Name()), "plain URDF",
-                 "expand the macros first: xacro robot.urdf.xacro > robot.urdf");
-  }
+  check_vocabulary(*robot_, report_);
+  const char* name = robot_->Attribute("name");
+  name_ = name ? name : "robot";
+  if (!name) report_.warn(robot_->GetLineNum(), "<robot> has no name; called \"robot\"");
   const char* version = robot_->Attribute("version");
   if (version && std::string_view(version) != "1.0") {
     report_.warn(robot_->GetLineNum(), fmt::format("URDF version {}; read as version 1.0", quoted(version)));

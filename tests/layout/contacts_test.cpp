@@ -342,7 +342,8 @@ TEST_CASE("an unknown collision shape is left out with a warning, and its neighb
                             joint("j", "continuous", "a", "b") + "</robot>");
   REQUIRE(model.shapes.size() == 1);
   REQUIRE(model.warnings ==
-          std::vector<std::string>{"test.urdf:2: link \"b\": its collision shape <torus> is not known; left out",
+          std::vector<std::string>{"test.urdf:2: link \"b\": <torus> is not known and not used; <geometry> may hold <sphere>, <box>, "
+                                   "<cylinder>, <capsule> or <mesh>",
                                    "test.urdf:3: link \"b\": a <collision> holds no shape; left out"});
 }
 

@@ -27,7 +27,8 @@ Strings told_of(const std::string& xml) {
 
 /// A link with its centre of mass, and moments without products.
 std::string solid(const std::string& name, const std::string& mass, const std::string& center, const std::string& moments) {
-  return fmt::format(R"(<link name="{}"><inertial><origin xyz="{}"/><mass value="{}"/><inertia {} ixy="0" ixz="0" iyz="0"/></inertial></link>)",
+  return fmt::format(R"(<link name="{}"><inertial><origin xyz="{}"/><mass value="{}"/>)"
+                     R"(<inertia {} ixy="0" ixz="0" iyz="0"/></inertial></link>)",
                      name, center, mass, moments);
 }
 
@@ -42,7 +43,8 @@ TEST_CASE("inertias are judged with all that is fixed to them, against mass time
   REQUIRE(fixed.size() == 1);
   CHECK_THAT(fixed[0], StartsWith("link \"antenna\": its inertia is not positive definite"));
   const std::string alone = robot("<link name=\"a\"/>" + antenna + joint("j", "continuous", "a", "antenna"));
-  CHECK_THAT(told_of(alone).front(), StartsWith("error: test.urdf: link \"antenna\": its inertia, with all that is fixed to it, is not positive"));
+  CHECK_THAT(told_of(alone).front(),
+             StartsWith("error: test.urdf: link \"antenna\": its inertia, with all that is fixed to it, is not positive"));
   // what rounding leaves of a zero, and a hundred times the slack
   const auto point = [&](const std::string& moments) {
     return told_of(robot("<link name=\"a\"/>" + solid("b", "0.5", "0 0 0.03", moments) + joint("j", "continuous", "a", "b")));
