@@ -166,6 +166,9 @@ struct Adding {
   void base(const char* group, Texts& texts) const {
     (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
   }
+  void strict(const char* group, bool& strict) const {
+    command->add_flag("--strict", strict, "refuse a model or scene that gives warnings")->group(group);
+  }
   void duration(Texts& texts) const { (*this)("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10"); }
   void step(Texts& texts) const { (*this)("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3"); }
   void gravity(const char* group, Texts& texts) const {
@@ -181,6 +184,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   const Adding add{command};
   add.model(run.model, kSceneHelp);
   add.base("Motion", texts);
+  add.strict("Motion", run.strict);
   add.duration(texts);
   add.step(texts);
   add.gravity("Motion", texts);
@@ -214,6 +218,7 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
   add.spread("Instances", texts);
   add.base("Motion", texts);
+  add.strict("Motion", rollout.strict);
   add.duration(texts);
   add.step(texts);
   add.gravity("Motion", texts);
@@ -262,6 +267,7 @@ CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accur
   const Adding add{command};
   add.model(accuracy.model, kSceneHelp);
   add.base("Motion", texts);
+  add.strict("Motion", accuracy.strict);
   add.duration(texts);
   add("Motion", "--dt", texts.dt, "S", "steps from 16 times to a quarter of this are tried, default 1e-3");
   add.gravity("Motion", texts);
@@ -285,6 +291,7 @@ CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect
   const Adding add{command};
   add.model(inspect.model, kSceneHelp);
   add.base("Options", texts);
+  add.strict("Options", inspect.strict);
   add.gravity("Options", texts);
   add("Options", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   command->add_flag("--all", inspect.all, "long tables whole, not their first 20 rows");

@@ -19,8 +19,14 @@ constexpr double kMostSteps = 1e12;
 }  // namespace
 
 std::shared_ptr<const Model> ModelArguments::loaded() const {
-  if (scene) return {scene, &scene->model};
-  return std::make_shared<const Model>(load_model(model, base));
+  std::shared_ptr<const Model> result;
+  if (scene) {
+    result = {scene, &scene->model};
+  } else {
+    result = std::make_shared<const Model>(load_model(model, base));
+  }
+  if (strict) refuse_warnings(*result);
+  return result;
 }
 
 std::optional<Randomness> randomness(const MotionArguments& arguments) {

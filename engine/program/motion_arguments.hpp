@@ -16,6 +16,7 @@ namespace linden {
 struct ModelArguments {
   std::string model;  // as it was given: a file, a generator with its size, a scene
   std::optional<Base> base;
+  bool strict = false;  // a model that gives warnings is refused
   std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
 
   Effects effects() const { return scene ? scene->effects : Effects(); }

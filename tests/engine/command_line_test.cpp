@@ -290,6 +290,21 @@ TEST_CASE("models that cannot be simulated are refused with the place of the mis
   }
 }
 
+TEST_CASE("strict refuses a model that gives warnings, and no other", "[command line]") {
+  const Shell shell;
+  const std::string hinge = "<joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/><orgin xyz=\"0 0 1\"/></joint>";
+  shell.write("slip.urdf", robot_xml(link_xml("a") + link_xml("b") + hinge));
+  shell.write("slip.yaml", "model: slip.urdf\nduration: 0.01\n");
+  for (const char* given : {"run slip.urdf --duration 0.01 ", "inspect slip.urdf ", "run slip.yaml ",
+                            "rollout slip.urdf --instances 2 --duration 0.01 "}) {
+    const std::string options(given);
+    CAPTURE(options);
+    CHECK(shell.linden(options).exit_code == 0);
+    check_refused(shell, options + "--strict", "<orgin> is not known and not used; did you mean <origin>?");
+  }
+  CHECK(shell.linden("run '" + kArm + "' --duration 0.01 --strict").exit_code == 0);
+}
+
 TEST_CASE("a run of higher order says so, and its solves are as exact as it is", "[command line]") {
   const Shell shell;
   const Outcome outcome = shell.linden("run chain:5 --order 8 --dt 4e-3 --duration 1 --json a.json");
