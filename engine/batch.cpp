@@ -11,6 +11,7 @@
 #include <cmath>
 #include <thread>
 
+#include "engine/required_model.hpp"
 #include "engine/step/instance_stepper.hpp"
 #include "layout/input_error.hpp"
 #include "layout/packed_history.hpp"
@@ -180,16 +181,15 @@ struct BatchOf<Real>::Data {
         }
       });
     }
-    return {numbers, count_of(entries), lanes};
+    return {numbers, count_of(entries), lanes, size};
   }
 
   Real* mass_row(std::int64_t i, Index slot) {
     return mass.data() + at(i / lanes, shape().slots * kMassRows) + static_cast<std::size_t>(slot * kMassRows * lanes + i % lanes);
   }
 
-  void check_instance(std::int64_t i) const {
-    if (i < 0 || i >= size) throw InputError(fmt::format("there is no instance {}: they go from 0 to {}", i, size - 1));
-  }
+  void check_instance(std::int64_t i) const { require_one_of("instance", i, 0, size - 1); }
+  void check_body(Index slot) const { require_one_of("body", slot, 1, model->tree.bodies()); }
 
   void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
     alone.forget();
@@ -205,12 +205,12 @@ struct BatchOf<Real>::Data {
       }
     }
     alone.set_velocities(velocities);
-    const BatchView<Real> to_q(q, shape().positions, lanes), to_p(p, shape().velocities, lanes);
+    const BatchView<Real> to_q(q, shape().positions, lanes, size), to_p(p, shape().velocities, lanes, size);
     for (Index row = 0; row < shape().positions; ++row) to_q(i, row) = static_cast<Real>(alone.state().q(row));
     for (Index row = 0; row < shape().velocities; ++row) to_p(i, row) = static_cast<Real>(alone.state().p(row));
     const auto clear = [&](auto& numbers, Index count_of_rows, double to = 0) {
       using Number = typename std::remove_reference_t<decltype(numbers)>::value_type;
-      const BatchView<Number> rows(numbers, count_of_rows, lanes);
+      const BatchView<Number> rows(numbers, count_of_rows, lanes, size);
       for (Index row = 0; !numbers.empty() && row < count_of_rows; ++row) rows(i, row) = static_cast<Number>(to);
     };
     clear(past, shape().velocities * kHistoryWords<Real>);
@@ -222,6 +222,12 @@ struct BatchOf<Real>::Data {
   }
 };
 
+void require_one_of(const char* what, std::int64_t found, std::int64_t first, std::int64_t last) {
+  if (found >= first && found <= last) return;
+  throw InputError(fmt::format("there is no {} {}: {}", what, found,
+                               last < first ? "there are none" : fmt::format("they go from {} to {}", first, last)));
+}
+
 template <class Real>
 BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& options, const Effects& effects)
     : BatchOf(std::make_shared<const Model>(std::move(model)), size, options, effects) {}
@@ -229,7 +235,7 @@ BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& optio
 template <class Real>
 BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options, const Effects& effects) {
   check_batch(size, options);
-  data_ = std::make_unique<Data>(std::move(model), size, options, effects);
+  data_ = std::make_unique<Data>(required(std::move(model)), size, options, effects);
 }
 
 template <class Real>
@@ -294,7 +300,7 @@ void BatchOf<Real>::reset_all(
 template <class Real>
 BatchView<Real> BatchOf<Real>::forces() {
   if (data_->applied.empty()) data_->applied.assign(data_->p.size(), Real(0));
-  return {data_->applied, data_->shape().velocities, lanes()};
+  return {data_->applied, data_->shape().velocities, lanes(), size()};
 }
 
 template <class Real>
@@ -313,7 +319,7 @@ template <class Real>
 void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<double, 10>& inertia) {
   data_->check_instance(i);
   const Tree& tree = model().tree;
-  if (slot < 1 || slot >= tree.shape.slots) throw InputError(fmt::format("there is no body {}: they go from 1 to {}", slot, tree.bodies()));
+  data_->check_body(slot);
   // a body's 6 x 6 inertia is positive semidefinite where its inertia about the centre of mass is
   const double m = inertia[0];
   const Eigen::Vector3d mc(inertia[1], inertia[2], inertia[3]);
@@ -352,6 +358,7 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
 template <class Real>
 std::array<double, 10> BatchOf<Real>::inertia(std::int64_t i, Index slot) const {
   data_->check_instance(i);
+  data_->check_body(slot);
   std::array<double, 10> result;
   for (std::size_t k = 0; k < 10; ++k) {
     result[k] = data_->mass.empty() ? model().constants.inertia(slot, static_cast<int>(k))
@@ -367,17 +374,17 @@ void BatchOf<Real>::step(std::int64_t n) {
 
 template <class Real>
 BatchView<const Real> BatchOf<Real>::positions() const {
-  return {data_->q, data_->shape().positions, lanes()};
+  return {data_->q, data_->shape().positions, lanes(), size()};
 }
 template <class Real>
 BatchView<const Real> BatchOf<Real>::momenta() const {
-  return {data_->p, data_->shape().velocities, lanes()};
+  return {data_->p, data_->shape().velocities, lanes(), size()};
 }
 
 template <class Real>
 typename BatchOf<Real>::Observation BatchOf<Real>::observe() const {
   const Index nv = data_->shape().velocities;
-  Observation seen{std::vector<Real>(data_->p.size()), std::vector<Real>(data_->at(data_->blocks, 2)), nv, lanes()};
+  Observation seen{std::vector<Real>(data_->p.size()), std::vector<Real>(data_->at(data_->blocks, 2)), nv, lanes(), size()};
   data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) {
     worker.block->observe(data_->block(b), seen.velocity_numbers.data() + data_->at(b, nv), seen.energy_numbers.data() + data_->at(b, 2));
   });

@@ -38,18 +38,25 @@ struct BatchOptions : Options {
   std::optional<Instructions> instructions;  // none: the best that the processor has
 };
 
-/// All instances' rows of one quantity where they lie: [block][row][lane].
+/// Throws InputError where `found` is none of first..last, which are called `what`.
+void require_one_of(const char* what, std::int64_t found, std::int64_t first, std::int64_t last);
+
+/// All instances' rows of one quantity where they lie: [block][row][lane]. Asked for an instance or a row that there is not, it throws
+/// InputError.
 template <class Number>
 class BatchView {
  public:
   using Real = std::remove_const_t<Number>;
   using Vector = std::conditional_t<std::is_const_v<Number>, const Eigen::VectorX<Real>, Eigen::VectorX<Real>>;
 
-  BatchView(std::span<Number> flat, Index rows, int lanes) : flat_(flat), rows_(rows), lanes_(lanes) {}
+  BatchView(std::span<Number> flat, Index rows, int lanes, std::int64_t size) : flat_(flat), rows_(rows), lanes_(lanes), size_(size) {}
 
   Index rows() const { return rows_; }
   int lanes() const { return lanes_; }
-  Number& operator()(std::int64_t instance, Index row) const { return flat_[offset(instance) + static_cast<std::size_t>(row * lanes_)]; }
+  Number& operator()(std::int64_t instance, Index row) const {
+    if (row < 0 || row >= rows_) require_one_of("row", row, 0, rows_ - 1);
+    return flat_[offset(instance) + static_cast<std::size_t>(row * lanes_)];
+  }
   /// One instance's rows, a strided Eigen vector.
   Eigen::Map<Vector, 0, Eigen::InnerStride<>> instance(std::int64_t instance) const {
     return {flat_.data() + offset(instance), rows_, Eigen::InnerStride<>(lanes_)};
@@ -59,12 +66,14 @@ class BatchView {
 
  private:
   std::size_t offset(std::int64_t instance) const {
+    if (instance < 0 || instance >= size_) require_one_of("instance", instance, 0, size_ - 1);
     const auto block = static_cast<std::size_t>(instance / lanes_), lane = static_cast<std::size_t>(instance % lanes_);
     return block * static_cast<std::size_t>(rows_) * static_cast<std::size_t>(lanes_) + lane;
   }
   std::span<Number> flat_;
   Index rows_;
   int lanes_;
+  std::int64_t size_;  // instances
 };
 
 /// Sums over all instances since the start.
@@ -79,7 +88,8 @@ template <class Real>
 class BatchOf {
  public:
   /// Every instance at rest in the model's zero configuration. Throws InputError for options that make no sense or that a batch does not
-  /// have: it solves by Newton's method, starts from extrapolation and stops by energy.
+  /// have: it solves by Newton's method, starts from extrapolation and stops by energy. Here and below an instance or a body that there is
+  /// not, and a null pointer, are InputErrors too.
   BatchOf(Model model, std::int64_t size, const BatchOptions& options = {}, const Effects& effects = {});
   BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options = {}, const Effects& effects = {});
   ~BatchOf();
@@ -126,8 +136,9 @@ class BatchOf {
     std::vector<Real> velocity_numbers, energy_numbers;
     Index nv;
     int lanes;
-    BatchView<const Real> velocities() const { return {velocity_numbers, nv, lanes}; }
-    BatchView<const Real> energies() const { return {energy_numbers, 2, lanes}; }
+    std::int64_t size;
+    BatchView<const Real> velocities() const { return {velocity_numbers, nv, lanes, size}; }
+    BatchView<const Real> energies() const { return {energy_numbers, 2, lanes, size}; }
   };
   Observation observe() const;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
 #include "engine/step/composition.hpp"
 #include "engine/step/instance_stepper.hpp"
@@ -28,7 +29,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(std::move(model)), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
+    : model_(required(std::move(model))), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
       stepper_(make_stepper(*model_, options, *plan_)) {
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);

@@ -38,7 +38,7 @@ struct Momentum {
 
 class Simulation {
  public:
-  /// At rest in the model's zero configuration. Throws InputError for options and effects that make no sense.
+  /// At rest in the model's zero configuration. Throws InputError for options and effects that make no sense, and for a null pointer.
   explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
   explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
   /// At the start of the scene (engine/scene/scene.hpp).

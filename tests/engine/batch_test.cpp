@@ -424,5 +424,39 @@ TEST_CASE("what makes no sense for a batch is refused with what was found and ex
   CHECK_THROWS_WITH(batch.set_inertia(0, 1, {1, 1, 0, 0, 1, 0, 0, 0.5, 0, 1}), Catch::Contains("no body's"));
 }
 
+TEST_CASE("an instance, a body or a row that there is not is refused wherever it is asked for") {
+  CHECK_THROWS_WITH(Batch(SharedModel(), 4), Catch::Contains("the pointer to the model is null"));
+  Batch batch(chain(3), 5);
+  const std::array<double, 10> inertia = batch.inertia(0, 3);
+  const auto refuses = [&](const auto& ask, const char* message) { CHECK_THROWS_WITH(ask(), Catch::Contains(message)); };
+  for (const bool own_masses : {false, true}) {
+    if (own_masses) batch.set_inertia(0, 3, inertia);
+    for (const Index slot : {-1, 0, 4, 99'999}) {
+      refuses([&] { batch.inertia(0, slot); }, "there is no body");
+      refuses([&] { batch.set_inertia(0, slot, inertia); }, "there is no body");
+    }
+  }
+  for (const std::int64_t i : {std::int64_t{-1}, std::int64_t{5}, std::int64_t{99'999}, std::numeric_limits<std::int64_t>::max()}) {
+    const char* const message = "they go from 0 to 4";
+    refuses([&] { batch.inertia(i, 1); }, message);
+    refuses([&] { batch.set_inertia(i, 1, inertia); }, message);
+    refuses([&] { batch.record(i); }, message);
+    refuses([&] { batch.describe(i); }, message);
+    refuses([&] { batch.positions()(i, 0); }, message);
+    refuses([&] { batch.momenta().instance(i); }, message);
+    refuses([&] { batch.forces()(i, 0); }, message);
+    refuses([&] { batch.observe().velocities().instance(i); }, message);
+  }
+  for (const Index row : {-1, 3}) {
+    refuses([&] { batch.positions()(0, row); }, "there is no row");
+    refuses([&] { batch.forces()(0, row); }, "there is no row");
+    refuses([&] { batch.observe().velocities()(0, row); }, "there is no row");
+  }
+  refuses([&] { batch.observe().energies()(0, 2); }, "there is no row 2: they go from 0 to 1");
+  refuses([&] { batch.servo_targets()(0, 0); }, "there is no row 0: there are none");
+  refuses([&] { batch.friction()(0, 0); }, "there is no row 0: there are none");
+  CHECK(batch.servo_targets().instance(0).size() == 0);
+}
+
 }  // namespace
 }  // namespace linden

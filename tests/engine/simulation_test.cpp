@@ -147,6 +147,10 @@ TEST_CASE("a checkpoint that no simulation saved is refused though its checksum 
   CHECK(simulation.steps() == 7);
 }
 
+TEST_CASE("a simulation without a model is refused") {
+  CHECK_THROWS_WITH(Simulation(std::shared_ptr<const Model>()), Catch::Contains("the pointer to the model is null"));
+}
+
 TEST_CASE("states of the wrong size or with bad numbers are refused by name") {
   Simulation simulation(chain(3));
   CHECK_THROWS_WITH(simulation.set_positions(std::vector<double>{1, 2}), Catch::Contains("2 numbers") && Catch::Contains("expected 3"));
