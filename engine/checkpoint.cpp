@@ -86,7 +86,15 @@ void Simulation::save(const std::string& file) {
 void Simulation::load(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: the checkpoint cannot be read; does the file exist?", file));
-  const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  std::string bytes;
+  const auto read_to = [&](std::size_t size) {  // no more than can be of use: the file may be any, and have no end
+    const std::size_t before = bytes.size();
+    bytes.resize(size);
+    in.read(bytes.data() + before, static_cast<std::streamsize>(size - before));
+    bytes.resize(before + static_cast<std::size_t>(in.gcount()));
+  };
+  const std::size_t body = kMagic.size() + sizeof(Header);
+  read_to(body);
   if (!bytes.starts_with(kMagic) && bytes.starts_with(kAnyFormat)) {
     throw InputError(fmt::format("{}: this checkpoint was saved by another version of linden, in another format; expected one that begins "
                                  "with \"{}\"; continue its run with that version, or begin anew",
@@ -97,13 +105,12 @@ void Simulation::load(const std::string& file) {
   State<double> loaded;
   loaded.allocate(model_->tree.shape);
   Header header{};
-  const std::size_t body = kMagic.size() + sizeof(Header);
-  if (bytes.size() < body + sizeof(std::uint64_t)) throw InputError(fmt::format("{}: the checkpoint is cut short", file));
+  if (bytes.size() < body) throw InputError(fmt::format("{}: the checkpoint is cut short", file));
   std::memcpy(&header, bytes.data() + kMagic.size(), sizeof(Header));
   if (header.model_hash != model_->hash()) {
     throw InputError(fmt::format("{}: this checkpoint belongs to another model ({} positions, {} velocities) than {} ({}, {}), "
                                  "or to one with other masses or lengths",
-                                 file, header.positions, header.velocities, quoted(model_->names.model),
+                                 file, header.positions, header.velocities, linden::quoted(model_->names.model),
                                  model_->tree.shape.positions, model_->tree.shape.velocities));
   }
   if (header.order != options_.order) {
@@ -128,10 +135,15 @@ void Simulation::load(const std::string& file) {
   std::optional<StageGuess> stage_guess = stage_guess_;
   if (stage_guess) expected += stage_guess->known().size_bytes() + stage_guess->numbers().size_bytes();
   for (const std::span<double> numbers : memory) expected += numbers.size_bytes();
+  read_to(expected + 1);
+  if (bytes.size() != expected) {
+    throw InputError(fmt::format("{}: the checkpoint is damaged: it holds {} bytes, expected {}; load another", file,
+                                 bytes.size() > expected ? "more" : std::to_string(bytes.size()), expected));
+  }
   std::uint64_t sum = 0;
   std::memcpy(&sum, bytes.data() + bytes.size() - sizeof(sum), sizeof(sum));
-  if (bytes.size() != expected || sum != checksum(std::string_view(bytes).substr(0, bytes.size() - sizeof(sum)))) {
-    throw InputError(fmt::format("{}: the checkpoint is damaged or cut short ({} bytes, expected {})", file, bytes.size(), expected));
+  if (sum != checksum(std::string_view(bytes).substr(0, bytes.size() - sizeof(sum)))) {
+    throw InputError(fmt::format("{}: the checkpoint is damaged: its checksum is not that of its numbers; load another", file));
   }
   const auto impossible = [&](const std::string& what) {
     throw InputError(fmt::format("{}: the checkpoint holds {}; expected what a simulation saved; save it again", file, what));

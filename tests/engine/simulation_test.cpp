@@ -108,7 +108,7 @@ TEST_CASE("a checkpoint that does not fit is refused and changes nothing") {
   CHECK_THROWS_WITH(simulation.load(folder.file("nothing")), Catch::Contains("cannot be read"));
   CHECK_THROWS_WITH(simulation.load(write("hello")), Catch::Contains("no checkpoint"));
   CHECK_THROWS_WITH(simulation.load(write("linden checkpoint 3\n" + bytes.substr(20))), Catch::Contains("another version of linden"));
-  CHECK_THROWS_WITH(simulation.load(write(bytes.substr(0, bytes.size() - 9))), Catch::Contains("damaged or cut short"));
+  CHECK_THROWS_WITH(simulation.load(write(bytes.substr(0, bytes.size() - 9))), Catch::Contains("damaged: it holds"));
   std::string flipped = bytes;
   flipped[bytes.size() / 2] = static_cast<char>(flipped[bytes.size() / 2] ^ 1);
   CHECK_THROWS_AS(simulation.load(write(flipped)), InputError);
@@ -145,6 +145,30 @@ TEST_CASE("a checkpoint that no simulation saved is refused though its checksum 
   CHECK_THAT(message_with(past, std::int64_t{1'000'000}), Catch::Contains("the displacements of 1000000 steps"));
   CHECK(message_with(header + 56, std::int64_t{7}) == "nothing was thrown");
   CHECK(simulation.steps() == 7);
+}
+
+TEST_CASE("of a file that is no checkpoint of this simulation only the first bytes are read") {
+  const Folder folder;
+  Simulation simulation(chain(5));
+  simulation.save(folder.file("state"));
+  const auto read_by_now = [] {  // bytes, by this process
+    std::ifstream io("/proc/self/io");
+    std::string name;
+    std::int64_t count = -1;
+    io >> name >> count;
+    return count;
+  };
+  const auto costs = [&](const std::string& file, const char* message) {
+    const std::int64_t before = read_by_now();
+    CHECK_THROWS_WITH(simulation.load(file), Catch::Contains(message));
+    return read_by_now() - before;
+  };
+  std::filesystem::resize_file(folder / "state", std::uintmax_t{1} << 28);
+  folder.write("else", "else");
+  std::filesystem::resize_file(folder / "else", std::uintmax_t{1} << 28);
+  CHECK(costs(folder.file("state"), "it holds more bytes, expected ") < 1'000'000);
+  CHECK(costs(folder.file("else"), "no checkpoint of linden") < 1'000'000);
+  CHECK(costs("/dev/zero", "no checkpoint of linden") < 1'000'000);
 }
 
 TEST_CASE("a simulation without a model is refused") {
