@@ -16,6 +16,7 @@
 
 #include "layout/collada.hpp"
 #include "layout/input_error.hpp"
+#include "layout/text_file.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
@@ -140,7 +141,7 @@ MeshBox obj_box(std::ifstream& in, const std::string& file) {
 MeshBox mesh_box(const std::string& file) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(file, error);
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_to_read(file);
   if (error || !in) fail(file, "it cannot be opened", "a readable file");
   const std::string ending = lower_case(std::filesystem::path(file).extension().string());
   MeshBox box;

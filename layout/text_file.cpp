@@ -3,12 +3,24 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 
 #include "layout/input_error.hpp"
 
 namespace linden {
+namespace {
+
+thread_local FilesRead* innermost = nullptr;
+
+}  // namespace
+
+FilesRead::FilesRead() : around_(innermost) { innermost = this; }
+FilesRead::~FilesRead() { innermost = around_; }
+
+std::ifstream open_to_read(const std::string& file) {
+  for (FilesRead* files = innermost; files; files = files->around_) files->names_.push_back(file);
+  return std::ifstream(file, std::ios::binary);
+}
 
 std::string read_text(const std::string& file, const std::string& what, std::size_t most_bytes) {
   std::error_code ignored;
@@ -18,7 +30,7 @@ std::string read_text(const std::string& file, const std::string& what, std::siz
   if (std::filesystem::is_directory(status)) {
     throw InputError(fmt::format("{}: this is a folder; expected {}; name a file in it", file, what));
   }
-  std::ifstream stream(file, std::ios::binary);
+  std::ifstream stream = open_to_read(file);
   if (!stream) throw InputError(fmt::format("{}: it cannot be opened; expected {}; check its permissions", file, what));
   constexpr std::size_t kChunk = 1 << 16;
   std::string text;

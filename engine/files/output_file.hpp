@@ -1,17 +1,20 @@
 // engine/files/output_file.hpp
-// Files that appear whole or not at all: a temporary file beside the target is renamed onto it when all is written.
+// Files that appear whole or not at all: a temporary file beside the destination is renamed onto it when all is written.
 #pragma once
 
 #include <cstdio>
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "engine/files/destination.hpp"
 
 namespace linden {
 
 class OutputFile {
  public:
-  /// Throws std::runtime_error, as write and commit do: `FILE: cannot be written: reason`.
+  /// Throws InputError for what is no ordinary file; std::runtime_error, as write and commit do: `FILE: cannot be written: reason`.
   explicit OutputFile(std::string target);
   /// What was not committed is deleted.
   ~OutputFile();
@@ -22,19 +25,31 @@ class OutputFile {
   void commit();
 
  private:
-  [[noreturn]] void fail();
-
-  std::string target_, temporary_;
+  Destination target_;
+  std::string temporary_;  // empty when it is no more
   std::FILE* file_ = nullptr;
 };
 
 /// Writes a whole file.
 void write_file(const std::string& file, std::string_view bytes);
 
-/// Whether both names lead to the same place, be there a file or not.
-bool same_file(const std::string& a, const std::string& b);
+/// A file that an option of the command line names. Its name has one of the endings, any where there are none.
+struct Output {
+  const char* option;
+  std::string file;  // empty: none is written
+  std::vector<std::string_view> endings;
+};
 
-/// Before long work: throws InputError where `file` has none of the endings (if there are any), is a folder or cannot be written.
-void require_writable(const std::string& option, const std::string& file, std::initializer_list<std::string_view> endings);
+/// What a command is to write, looked at before long work.
+class Outputs {
+ public:
+  /// Throws InputError where one cannot be written or two of them are one file.
+  Outputs(std::initializer_list<Output> outputs);
+  /// Throws InputError where one of them is a file that is read, whatever path or link leads there.
+  void spare(const std::vector<std::string>& read) const;
+
+ private:
+  std::vector<Output> outputs_;
+};
 
 }  // namespace linden

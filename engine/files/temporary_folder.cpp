@@ -4,34 +4,14 @@
 #include <sys/stat.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <filesystem>
-#include <random>
-#include <stdexcept>
 #include <system_error>
 #include <utility>
 
 namespace linden {
-namespace {
 
-std::string hidden_beside(const std::string& target) {
-  std::filesystem::path path = target;
-  path.replace_filename(fmt::format(".{}.{:08x}.part", path.filename().string(), std::random_device{}()));
-  return path.string();
-}
-
-}  // namespace
-
-void cannot_be_written(const std::string& file, std::string_view reason) {
-  throw std::runtime_error(fmt::format("{}: cannot be written: {}", file, reason));
-}
-
-void cannot_be_written(const std::string& file, int error) {
-  cannot_be_written(file, error != 0 ? std::generic_category().message(error) : "unknown reason");
-}
-
-TemporaryFolder::TemporaryFolder(std::string target) : target_(std::move(target)), folder_(hidden_beside(target_)) {
-  if (::mkdir(folder_.c_str(), 0777) != 0) cannot_be_written(target_, errno);
+TemporaryFolder::TemporaryFolder(std::string file) : target_(std::move(file)), folder_(target_.temporary()) {
+  if (::mkdir(folder_.c_str(), 0777) != 0) cannot_be_written(target_.file(), errno);
 }
 
 TemporaryFolder::~TemporaryFolder() {
@@ -41,8 +21,6 @@ TemporaryFolder::~TemporaryFolder() {
 
 std::string TemporaryFolder::file(std::string_view name) const { return fmt::format("{}/{}", folder_, name); }
 
-void TemporaryFolder::publish(std::string_view name) {
-  if (std::rename(file(name).c_str(), target_.c_str()) != 0) cannot_be_written(target_, errno);
-}
+void TemporaryFolder::publish(std::string_view name) { target_.publish(file(name)); }
 
 }  // namespace linden

@@ -6,29 +6,27 @@
 #include <string>
 #include <string_view>
 
-namespace linden {
+#include "engine/files/destination.hpp"
 
-/// Throws std::runtime_error: `FILE: cannot be written: reason`.
-[[noreturn]] void cannot_be_written(const std::string& file, std::string_view reason);
-/// The reason is an errno.
-[[noreturn]] void cannot_be_written(const std::string& file, int error);
+namespace linden {
 
 class TemporaryFolder {
  public:
-  /// Throws, as publish does, cannot_be_written.
-  explicit TemporaryFolder(std::string target);
+  /// Throws InputError for what is no ordinary file; as publish does, cannot_be_written.
+  explicit TemporaryFolder(std::string file);
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
-  const std::string& target() const { return target_; }
+  const std::string& target() const { return target_.file(); }
   /// Where a temporary file of that name lies.
   std::string file(std::string_view name) const;
   /// Renames it onto the target.
   void publish(std::string_view name);
 
  private:
-  std::string target_, folder_;
+  Destination target_;
+  std::string folder_;
 };
 
 }  // namespace linden

@@ -20,25 +20,21 @@ namespace {
 
 constexpr double kMostBudget = 1e6;  // [s]
 
-void check_arguments(const AccuracyArguments& arguments) {
+Outputs checked_outputs(const AccuracyArguments& arguments) {
   check(arguments.options);
   (void)step_count(arguments, arguments.options.step);
   if (!(arguments.budget > 0) || arguments.budget > kMostBudget) {
     throw InputError(fmt::format("--budget {}: expected seconds above zero, at most {:.0e}", arguments.budget, kMostBudget));
   }
-  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
-  if (!arguments.plot.empty()) require_writable("--plot", arguments.plot, {".svg", ".png"});
-  for (const std::string& file : {arguments.json, arguments.plot}) {
-    if (!file.empty() && same_file(file, arguments.model)) throw InputError(fmt::format("{} would be overwritten", file));
-  }
+  return {{"--json", arguments.json, {".json"}}, {"--plot", arguments.plot, {".svg", ".png"}}};
 }
 
-AccuracySetup setup_of(const AccuracyArguments& arguments) {
+AccuracySetup setup_of(const AccuracyArguments& arguments, const Outputs& outputs) {
   AccuracySetup setup;
   setup.options = arguments.options;
   setup.duration = arguments.duration;
   setup.budget = arguments.budget;
-  setup.model = arguments.loaded();
+  setup.model = arguments.loaded(outputs);
   setup.effects = arguments.effects();
   if (arguments.scene) {
     setup.start = arguments.scene->initial;
@@ -64,8 +60,7 @@ AccuracyFigures measure(const AccuracySetup& setup, int& signal) {
 }  // namespace
 
 int accuracy_command(const AccuracyArguments& arguments) {
-  check_arguments(arguments);
-  const AccuracySetup setup = setup_of(arguments);
+  const AccuracySetup setup = setup_of(arguments, checked_outputs(arguments));
   print_warnings(*setup.model);
   int signal = 0;
   const AccuracyFigures figures = measure(setup, signal);

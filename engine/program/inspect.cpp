@@ -380,9 +380,8 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
 
 int inspect(const InspectArguments& arguments) {
   check(arguments.options);
-  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
-  if (same_file(arguments.json, arguments.model)) throw InputError(fmt::format("--json {} would overwrite the model", arguments.json));
-  const std::shared_ptr<const Model> loaded = arguments.loaded();
+  const Outputs outputs{{"--json", arguments.json, {".json"}}};
+  const std::shared_ptr<const Model> loaded = arguments.loaded(outputs);
   const Model& model = *loaded;
   const Costs costs = measure(arguments, model);
   if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs));

@@ -336,6 +336,8 @@ int run_program(int argc, char** argv) {
                  "  linden accuracy chain:10 --duration 2\n"
                  "  linden scaling --dofs 10..10000\n"
                  "  linden inspect models/humanoid.urdf --base floating\n\n"
+                 "Outputs are ordinary files, and none is written over a file that the same command reads. One that is there is replaced when\n"
+                 "all is written and keeps its mode and owner; of a symbolic link, what it leads to is replaced and the link stays.\n\n"
                  "linden COMMAND --help says more.");
   program.get_formatter()->column_width(30);
   Texts texts;

@@ -10,6 +10,7 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
+#include "layout/text_file.hpp"
 
 namespace linden {
 namespace {
@@ -18,13 +19,15 @@ constexpr double kMostSteps = 1e12;
 
 }  // namespace
 
-std::shared_ptr<const Model> ModelArguments::loaded() const {
+std::shared_ptr<const Model> ModelArguments::loaded(const Outputs& outputs) const {
+  const FilesRead files;
   std::shared_ptr<const Model> result;
   if (scene) {
     result = {scene, &scene->model};
   } else {
     result = std::make_shared<const Model>(load_model(model, base));
   }
+  outputs.spare(scene ? scene->files : files.names());
   if (strict) refuse_warnings(*result);
   return result;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "engine/files/output_file.hpp"
 #include "engine/options.hpp"
 #include "engine/scene/scene.hpp"
 #include "layout/urdf.hpp"
@@ -20,8 +21,8 @@ struct ModelArguments {
   std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
 
   Effects effects() const { return scene ? scene->effects : Effects(); }
-  /// The scene's model, or the one that `model` names. Throws InputError.
-  std::shared_ptr<const Model> loaded() const;
+  /// The scene's model, or the one that `model` names. Throws InputError, also where one of the outputs is a file that it is read from.
+  std::shared_ptr<const Model> loaded(const Outputs& outputs) const;
 };
 
 struct MotionArguments : ModelArguments {

@@ -25,14 +25,10 @@ namespace {
 
 using Clock = Progress::Clock;
 
-void check_arguments(const RolloutArguments& arguments) {
+Outputs checked_outputs(const RolloutArguments& arguments) {
   if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
   if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
-  if (!arguments.record.empty()) require_writable("--record", arguments.record, {".npz", ".h5"});
-  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
-  for (const std::string& file : {arguments.record, arguments.json}) {
-    if (!file.empty() && same_file(file, arguments.model)) throw InputError(fmt::format("{} would overwrite the model", file));
-  }
+  return {{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
 }
 
 /// Refuses more instances than this machine's memory holds, with what is computed of all of them at once.
@@ -193,9 +189,9 @@ int rollout_command(const RolloutArguments& given) {
   RolloutArguments arguments = given;
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
-  check_arguments(arguments);
+  const Outputs outputs = checked_outputs(arguments);
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
-  const std::shared_ptr<const Model> model = arguments.loaded();
+  const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
   return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
 }

@@ -9,7 +9,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "engine/files/output_file.hpp"
@@ -38,29 +37,17 @@ bool holds_something_else(const std::string& file) {
   return in.gcount() > 0 && begins != kBegins;
 }
 
-/// Every file that is to be written can be, and none of them is another or the model itself.
-void check_outputs(const RunArguments& arguments) {
-  const std::pair<const char*, const std::string&> outputs[] = {{"--record", arguments.record},
-                                                                {"--json", arguments.json},
-                                                                {"--plot", arguments.plot},
-                                                                {"--save", arguments.save}};
-  if (!arguments.record.empty()) require_writable("--record", arguments.record, {".csv"});
-  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
-  if (!arguments.plot.empty()) require_writable("--plot", arguments.plot, {".svg", ".png"});
-  if (!arguments.save.empty()) require_writable("--save", arguments.save, {});
+/// Every file that is to be written can be.
+Outputs checked_outputs(const RunArguments& arguments) {
+  Outputs outputs{{"--record", arguments.record, {".csv"}},
+                  {"--json", arguments.json, {".json"}},
+                  {"--plot", arguments.plot, {".svg", ".png"}},
+                  {"--save", arguments.save, {}}};
   if (!arguments.save.empty() && holds_something_else(arguments.save)) {
     throw InputError(fmt::format("--save {}: the file exists and is no checkpoint; choose another name", arguments.save));
   }
-  for (const auto& [option, file] : outputs) {
-    if (file.empty()) continue;
-    if (same_file(file, arguments.model)) throw InputError(fmt::format("{} {} would overwrite the model", option, file));
-    for (const auto& [other_option, other] : outputs) {
-      if (option == other_option) break;
-      if (!other.empty() && same_file(file, other)) {
-        throw InputError(fmt::format("{} and {} both name {}; give each a file of its own", other_option, option, file));
-      }
-    }
-  }
+  if (!arguments.load.empty()) outputs.spare({arguments.load});
+  return outputs;
 }
 
 /// Puts the simulation where the run is to begin.
@@ -181,9 +168,9 @@ int run_command(const RunArguments& arguments) {
   const Clock::time_point begin = Clock::now();
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
-  check_outputs(arguments);
+  const Outputs outputs = checked_outputs(arguments);
 
-  const std::shared_ptr<const Model> model = arguments.loaded();
+  const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
   Simulation simulation(model, arguments.options, arguments.effects());
   begin_run(arguments, simulation);

@@ -67,8 +67,7 @@ void check_arguments(const ScalingArguments& arguments) {
   check(arguments.options);
   check_spread(arguments.spread);
   if (arguments.steps && *arguments.steps < 1) throw InputError(fmt::format("--steps {}: expected 1 step or more", *arguments.steps));
-  if (!arguments.json.empty()) require_writable("--json", arguments.json, {".json"});
-  if (!arguments.plot.empty()) require_writable("--plot", arguments.plot, {".svg", ".png"});
+  const Outputs writable{{"--json", arguments.json, {".json"}}, {"--plot", arguments.plot, {".svg", ".png"}}};
 }
 
 /// The steps of one row.

@@ -18,6 +18,7 @@ struct Scene {
   double duration = 10;   // [s]
   InitialState initial;   // positions [nq], velocities [nv]; empty: at rest in the zero configuration
   Effects effects;
+  std::vector<std::string> files{};  // that it was read from: scene, models, meshes, tables
 };
 
 }  // namespace linden

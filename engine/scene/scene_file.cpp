@@ -237,7 +237,10 @@ class SceneReader {
 bool is_scene(const std::string& file) { return file.ends_with(".yaml") || file.ends_with(".yml"); }
 
 Scene load_scene(const std::string& file, const SceneStart& given) {
-  return parse_scene(read_text(file, "a scene", SceneYaml::kMostBytes), file, given);
+  const FilesRead files;
+  Scene scene = parse_scene(read_text(file, "a scene", SceneYaml::kMostBytes), file, given);
+  scene.files = files.names();
+  return scene;
 }
 
 Scene parse_scene(const std::string& text, const std::string& file, const SceneStart& given) {

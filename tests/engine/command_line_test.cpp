@@ -1,5 +1,8 @@
 #include "tests/engine/command_line.hpp"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -351,7 +354,7 @@ TEST_CASE("options that make no sense are refused before anything is computed", 
 
 TEST_CASE("outputs that cannot be written are refused before anything is computed", "[command line]") {
   const Shell shell;
-  shell.write("model.json", "");
+  shell.write("model.json", robot_xml(link_xml("a") + link_xml("b") + joint_xml("j", "a", "b")));
   std::filesystem::create_directory(shell / "folder.csv");
   check_refused(shell, "run chain:3 --record a.txt", "expected .csv");
   check_refused(shell, "run chain:3 --json a", "expected .json");
@@ -360,9 +363,9 @@ TEST_CASE("outputs that cannot be written are refused before anything is compute
   check_refused(shell, "run chain:3 --record folder.csv", "this is a folder");
   check_refused(shell, "run chain:3 --save folder.csv", "this is a folder");
   check_refused(shell, "run chain:3 --json /proc/a.json", "cannot be written");
-  check_refused(shell, "run chain:3 --json a.json --save a.json", "both name");
-  check_refused(shell, "run model.json --json model.json", "overwrite the model");
-  check_refused(shell, "inspect model.json --json model.json", "overwrite the model");
+  check_refused(shell, "run chain:3 --json a.json --save a.json", "name one file");
+  check_refused(shell, "run model.json --json model.json", "would overwrite model.json");
+  check_refused(shell, "inspect model.json --json model.json", "would overwrite model.json");
   check_refused(shell, "inspect chain:3 --json a.csv", "expected .json");
   // good outputs beside bad ones are not written either
   check_refused(shell, "run chain:3 --record a.csv --json nowhere/a.json", "nowhere");
@@ -444,4 +447,120 @@ TEST_CASE("help shows an example for every command", "[command line]") {
   const Outcome version = shell.linden("--version");
   CHECK(version.exit_code == 0);
   CHECK_THAT(version.out, StartsWith("linden ") && Contains("."));
+}
+
+TEST_CASE("no output goes where something is read from, however its path is spelled", "[command line]") {
+  const Shell shell;
+  shell.write("arm.urdf", robot_xml(link_xml("a") + link_xml("b") + joint_xml("j", "a", "b") +
+                                    "<link name=\"c\"><collision><geometry><mesh filename=\"part.stl\"/></geometry></collision></link>" +
+                                    joint_xml("k", "b", "c", "fixed")));
+  shell.write("part.stl", "solid\nvertex 0 0 1\nvertex 0 1 1\nvertex 1 0 0\nendsolid\n");
+  shell.write("push.csv", "0,0\n1,2\n");
+  shell.write("hills.csv", "0,0\n0,0\n");
+  shell.write("scene.yaml",
+              "model: arm.urdf\nduration: 0.01\neffects:\n  torque: {j: push.csv}\n"
+              "  ground: {terrain: {file: hills.csv, spacing: [1, 1]}, height: -9}\n");
+  std::filesystem::create_directory(shell / "folder");
+  std::filesystem::create_symlink("folder", shell / "way");
+  std::filesystem::create_symlink("push.csv", shell / "link.csv");
+  std::filesystem::create_hard_link(shell / "push.csv", shell / "hard.csv");
+  REQUIRE(shell.linden("run scene.yaml").exit_code == 0);
+
+  for (const char* name : {"push.csv", "./push.csv", "folder/../push.csv", "way/../push.csv", "link.csv", "hard.csv"}) {
+    check_refused(shell, fmt::format("run scene.yaml --record {}", name),
+                  fmt::format("--record {} would overwrite push.csv, which is read", name));
+  }
+  check_refused(shell, fmt::format("run scene.yaml --record '{}'", shell.file("hills.csv")), "would overwrite hills.csv");
+  for (const char* input : {"scene.yaml", "arm.urdf", "part.stl", "push.csv", "hills.csv"}) {
+    std::filesystem::create_symlink(input, shell / "out.json");
+    for (const char* command : {"run", "rollout", "accuracy", "inspect"}) {
+      check_refused(shell, fmt::format("{} scene.yaml --json out.json", command), fmt::format("{}, which is read", input));
+    }
+    std::filesystem::remove(shell / "out.json");
+  }
+  REQUIRE(shell.linden("run chain:3 --duration 0.01 --save state").exit_code == 0);
+  check_refused(shell, "run chain:3 --load state --save ./state", "--save ./state would overwrite state");
+}
+
+TEST_CASE("no two outputs are one file, however their paths are spelled and before there is one", "[command line]") {
+  const Shell shell;
+  std::filesystem::create_directory(shell / "folder");
+  std::filesystem::create_symlink("folder", shell / "way");
+  std::filesystem::create_symlink("a.json", shell / "a.svg");
+  for (const char* other : {"--save a.json", "--save ./a.json", "--save folder/../a.json", "--save way/../a.json", "--plot a.svg"}) {
+    check_refused(shell, fmt::format("run chain:3 --json a.json {}", other), "name one file");
+  }
+  check_refused(shell, fmt::format("run chain:3 --json '{}' --save a.json", shell.file("a.json")), "name one file");
+  check_refused(shell, "scaling --json a.json --plot a.svg", "name one file");
+  CHECK(shell.linden("run chain:3 --duration 0.01 --json a.json --save folder/a.json").exit_code == 0);
+}
+
+TEST_CASE("outputs go to ordinary files alone", "[command line]") {
+  const Shell shell;
+  const std::string device = "/dev/null", run = "run chain:3 --duration 0.01 ";
+  REQUIRE(::mkfifo((shell / "pipe.csv").c_str(), 0600) == 0);
+  std::filesystem::create_directory(shell / "folder");
+  std::filesystem::create_symlink("circle.csv", shell / "circle.csv");
+  std::filesystem::create_symlink(device, shell / "device.csv");
+  std::filesystem::create_symlink("folder", shell / "folder.csv");
+  check_refused(shell, run + "--save " + device, "--save /dev/null: this is a device; expected an ordinary file");
+  check_refused(shell, run + "--record device.csv", "--record device.csv: this is a device; expected an ordinary file");
+  check_refused(shell, run + "--record pipe.csv", "--record pipe.csv: this is a pipe; expected an ordinary file");
+  check_refused(shell, run + "--record circle.csv", "--record circle.csv: this is a symbolic link that leads in a circle");
+  check_refused(shell, run + "--record folder.csv", "--record folder.csv: this is a folder; expected an ordinary file");
+  check_refused(shell, run + "--save folder/", "--save folder/: this is a folder; expected an ordinary file");
+  std::filesystem::create_symlink(device, shell / "device.npz");
+  check_refused(shell, "rollout chain:3 --record device.npz", "this is a device");
+  CHECK(std::filesystem::is_character_file(device));
+  CHECK(std::filesystem::is_fifo(shell / "pipe.csv"));
+  CHECK_THROWS_WITH(Simulation(chain(3)).save(shell.file("pipe.csv")), Contains("this is a pipe"));
+}
+
+TEST_CASE("a link to an ordinary file is followed, and stays", "[command line]") {
+  const Shell shell;
+  std::filesystem::create_directory(shell / "folder");
+  shell.write("folder/old.csv", "old");
+  for (const char* name : {"old", "new"}) {
+    std::filesystem::create_symlink(fmt::format("folder/{}.csv", name), shell / fmt::format("{}.csv", name));
+    std::filesystem::create_symlink(fmt::format("{}.csv", name), shell / fmt::format("{}_too.csv", name));
+    CHECK(shell.linden(fmt::format("run chain:3 --duration 0.01 --record {}_too.csv", name)).exit_code == 0);
+    CHECK(std::filesystem::is_symlink(shell / fmt::format("{}.csv", name)));
+    CHECK(std::filesystem::is_symlink(shell / fmt::format("{}_too.csv", name)));
+    CHECK(csv_of(shell / "folder" / fmt::format("{}.csv", name)).rows.size() == 11);
+  }
+  std::filesystem::create_symlink("folder/roll.npz", shell / "roll.npz");
+  CHECK(shell.linden("rollout chain:3 --instances 2 --duration 0.01 --record roll.npz").exit_code == 0);
+  CHECK(std::filesystem::is_symlink(shell / "roll.npz"));
+  CHECK(std::filesystem::is_regular_file(shell / "folder" / "roll.npz"));
+}
+
+TEST_CASE("a file that is replaced keeps its mode", "[command line]") {
+  const Shell shell;
+  using std::filesystem::perms;
+  const perms mode = perms::owner_read | perms::owner_write | perms::group_exec | perms::others_write;
+  for (const char* name : {"a.csv", "a.json", "a.svg", "a.npz", "a.h5"}) {
+    shell.write(name, "old");
+    std::filesystem::permissions(shell / name, mode);
+  }
+  CHECK(shell.linden("run chain:3 --duration 0.01 --record a.csv --json a.json --plot a.svg").exit_code == 0);
+  for (const char* name : {"a.npz", "a.h5"}) {
+    CHECK(shell.linden(fmt::format("rollout chain:3 --instances 2 --duration 0.01 --record {}", name)).exit_code == 0);
+  }
+  for (const char* name : {"a.csv", "a.json", "a.svg", "a.npz", "a.h5"}) {
+    INFO(name);
+    CHECK(text_of(shell / name) != "old");
+    CHECK(std::filesystem::status(shell / name).permissions() == mode);
+  }
+}
+
+TEST_CASE("root, who may, leaves a file that is replaced to its owner", "[command line]") {
+  if (::geteuid() != 0) return;
+  const Shell shell;
+  shell.write("a.csv", "old");
+  REQUIRE(::chown((shell / "a.csv").c_str(), 12345, 23456) == 0);
+  CHECK(shell.linden("run chain:3 --duration 0.01 --record a.csv").exit_code == 0);
+  struct stat now {};
+  REQUIRE(::stat((shell / "a.csv").c_str(), &now) == 0);
+  CHECK(now.st_uid == 12345);
+  CHECK(now.st_gid == 23456);
 }

@@ -63,9 +63,7 @@ int run_gallery(int argc, char** argv) {
     throw InputError(fmt::format("{}; linden_gallery --help says more", error.what()));
   }
   if (full && quick) throw InputError("--full and --quick: expected one of them");
-  for (const auto& [option, file] : {std::pair{"--csv", csv}, std::pair{"--markdown", markdown}}) {
-    if (!file.empty()) require_writable(option, file, {});
-  }
+  const Outputs writable{{"--csv", csv, {}}, {"--markdown", markdown, {}}};
 
   const std::vector<Case> cases = all_cases();
   // a whole name stands for itself, another for all that begin so
