@@ -153,15 +153,20 @@ void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
 constexpr const char* kSceneHelp = "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 
+/// An empty text is how the code says that an option is absent; one that is written out is a slip, such as of a variable in a script.
+std::string filled(const std::string& text) {
+  return text.empty() ? "the value is empty; expected something; write it, or leave the option out" : "";
+}
+
 /// Options of one command, each a text until all have been read.
 struct Adding {
   CLI::App* command;
 
   void operator()(const char* group, const char* name, std::string& text, const char* value, const char* meaning) const {
-    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group);
+    command->add_option(name, text, meaning)->option_text(value)->type_name("value")->group(group)->check(filled);
   }
   void model(std::string& name, const char* help = kModelHelp) const {
-    command->add_option("MODEL", name, help)->required()->option_text(" ");
+    command->add_option("MODEL", name, help)->required()->option_text(" ")->check(filled);
   }
   void base(const char* group, Texts& texts) const {
     (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");

@@ -564,3 +564,14 @@ TEST_CASE("root, who may, leaves a file that is replaced to its owner", "[comman
   CHECK(now.st_uid == 12345);
   CHECK(now.st_gid == 23456);
 }
+
+TEST_CASE("an option with an empty value is refused", "[command line]") {
+  const Shell shell;
+  for (const char* option : {"--record", "--json", "--plot", "--save", "--load", "--dt", "--base"}) {
+    check_refused(shell, fmt::format("run chain:3 {} ''", option), fmt::format("{}: the value is empty", option));
+    check_refused(shell, fmt::format("run chain:3 {}=", option), option);
+  }
+  check_refused(shell, "rollout chain:3 --record ''", "--record: the value is empty");
+  check_refused(shell, "scaling --json ''", "--json: the value is empty");
+  check_refused(shell, "run ''", "the value is empty");
+}
