@@ -2,6 +2,8 @@
 
 #include <iterator>
 #include <string_view>
+#include <unordered_set>
+#include <utility>
 
 namespace linden {
 namespace {
@@ -17,9 +19,24 @@ std::string csv_cell(const std::string& name) {
 
 }  // namespace
 
+std::vector<std::string> recorded_columns(const Names& names) {
+  std::vector<std::string> columns{"time", "energy"};
+  columns.insert(columns.end(), names.position.begin(), names.position.end());
+  std::unordered_set<std::string> taken(columns.begin(), columns.end()), seen;
+  for (std::string& column : columns) {
+    if (seen.insert(column).second) continue;
+    int k = 2;
+    while (!taken.insert(fmt::format("{}_{}", column, k)).second) ++k;
+    column = fmt::format("{}_{}", column, k);
+  }
+  return columns;
+}
+
 Recorder::Recorder(const std::string& file, const Names& names) : out_(file) {
-  fmt::format_to(std::back_inserter(text_), "time,energy");
-  for (const std::string& name : names.position) fmt::format_to(std::back_inserter(text_), ",{}", csv_cell(name));
+  const char* gap = "";
+  for (const std::string& column : recorded_columns(names)) {
+    fmt::format_to(std::back_inserter(text_), "{}{}", std::exchange(gap, ","), csv_cell(column));
+  }
   text_.push_back('\n');
 }
 

@@ -9,11 +9,16 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "engine/files/output_file.hpp"
 #include "layout/names.hpp"
 
 namespace linden {
+
+/// No two are alike: a name that another column had before, such as that of a joint "time", is followed by _2, or by _3 and so on where
+/// there is a column called that.
+std::vector<std::string> recorded_columns(const Names& names);
 
 class Recorder {
  public:

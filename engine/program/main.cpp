@@ -206,7 +206,8 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");
   add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
   command->footer(
-      "Coordinates are named after their joints; quaternions are x y z w. Ctrl-C ends a run early and keeps its files.\n"
+      "Coordinates are named after their joints, a name that is taken with _2 behind it; quaternions are x y z w. Ctrl-C ends a run early\n"
+      "and keeps its files.\n"
       "What is given here goes over what a scene says.\n\n"
       "Examples:\n"
       "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"

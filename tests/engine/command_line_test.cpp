@@ -575,3 +575,21 @@ TEST_CASE("an option with an empty value is refused", "[command line]") {
   check_refused(shell, "scaling --json ''", "--json: the value is empty");
   check_refused(shell, "run ''", "the value is empty");
 }
+
+TEST_CASE("no two columns of a recording bear one name", "[command line]") {
+  const Shell shell;
+  std::string links = link_xml("l0"), joints;
+  const std::vector<std::string> names{"time", "energy", "time_2"};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    links += link_xml(fmt::format("l{}", i + 1));
+    joints += joint_xml(names[i], fmt::format("l{}", i), fmt::format("l{}", i + 1));
+  }
+  shell.write("arm.urdf", robot_xml(links + joints));
+  REQUIRE(shell.linden("run arm.urdf --base floating --duration 0.001 --record a.csv").exit_code == 0);
+  const Csv csv = csv_of(shell / "a.csv");
+  const std::set<std::string> different(csv.columns.begin(), csv.columns.end());
+  CHECK(different.size() == 2 + 7 + 3);
+  for (const char* name : {"time", "energy", "time_3", "energy_2", "time_2"}) CHECK(different.contains(name));
+  CHECK(csv.columns.size() == different.size());
+  CHECK(csv.rows.at(0).size() == different.size());
+}
