@@ -1,6 +1,7 @@
 // Compiled with effects and without; CMakeLists.txt says which: LINDEN_ACTING is true or false.
 #include "engine/step/tree_stepper.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -50,7 +51,10 @@ TreeStepper<kEffects>::TreeStepper(const Model& model, const Options& options, c
   check(options);
   last_good_.allocate(model.tree.shape);
   before_.allocate(model.tree.shape.velocities);
-  if constexpr (kEffects) before_innovation_.allocate(model.tree.shape.velocities);
+  if constexpr (kEffects) {
+    before_innovation_.allocate(model.tree.shape.velocities);
+    keep(last_good_);  // no step allocates
+  }
 }
 
 template <bool kEffects>
@@ -58,20 +62,22 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
   StepReport report;
   time_ = time;
   account_ = {};
-  bool bounces = false;
-  if constexpr (kEffects) bounces = effects_.plan().bounces;
-  if (bounces) last_good_ = state;  // parts of the step may be taken before one fails
+  bool changes = false;  // before a solve fails: parts of the step are taken, or a start is struck at its limits
+  if constexpr (kEffects) {
+    changes = effects_.plan().bounces || (state.last_step(0) == 0 && !effects_.plan().effects.limits.empty());
+  }
+  if (changes) keep(state);
   const int history_before = history;
   report.status = advance(state, history, h, another, report);
   if (report.ok()) return report;
   // The whole step failed: two halves, each split again if need be, from the state as it was.
-  if (bounces) {
+  if (changes) {
     restore(state);
   } else {
-    last_good_ = state;
+    keep(state);
   }
   history = 0;
-  report.substeps = 0;
+  report.substeps = report.blows = 0;
   if (halves(state, history, h, 1, report)) {
     report.status = StepStatus::converged;
     report.slot = 0;
@@ -83,11 +89,27 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
   return report;
 }
 
-/// The state at the beginning of the step.
+/// The state at the beginning of the step, and what effects keep beside it.
+template <bool kEffects>
+void TreeStepper<kEffects>::keep(const State<double>& state) {
+  last_good_ = state;
+  if constexpr (kEffects) {
+    last_memory_.clear();
+    for (const std::span<double> numbers : effects_.memory()) last_memory_.insert(last_memory_.end(), numbers.begin(), numbers.end());
+  }
+}
+
 template <bool kEffects>
 void TreeStepper<kEffects>::restore(State<double>& state) {
   state = last_good_;
   account_ = {};
+  if constexpr (kEffects) {
+    auto next = last_memory_.begin();
+    for (const std::span<double> numbers : effects_.memory()) {
+      std::copy_n(next, numbers.size(), numbers.begin());
+      next += static_cast<std::ptrdiff_t>(numbers.size());
+    }
+  }
   sweeps_.refresh(state.q);
 }
 

@@ -69,6 +69,7 @@ class TreeStepper final : public Stepper {
     requires kEffects;
   bool strike(State<double>& state, double h, bool arrived, StepReport& report)
     requires kEffects;
+  void keep(const State<double>& state);
   void restore(State<double>& state);
   StepStatus solve(State<double>& state, int history, double h, StepReport& report);
   StepStatus find_root(State<double>& state, int history, double h, StepReport& report);
@@ -94,7 +95,8 @@ class TreeStepper final : public Stepper {
   [[no_unique_address]] std::conditional_t<kEffects, Blows, NoBlows> blows_;
   bool passable_ = false;  // see limits.hpp
   double time_ = 0;
-  State<double> last_good_;
+  State<double> last_good_;           // see keep
+  std::vector<double> last_memory_;   // likewise
 };
 
 /// See make_stepper.

@@ -1,5 +1,6 @@
 // Joints that strike their limits.
 #include <catch2/catch.hpp>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -140,6 +141,25 @@ TEST_CASE("a blow leaves no joint faster than its limit of velocity, nor one tha
     CHECK(struck);
     CHECK(simulation.passive_gifts().empty());
   }
+}
+
+TEST_CASE("a step that fails leaves all as it was, a start that was struck and what effects remember", "[blows]") {
+  Effects effects = limited(2, 0.3, 0);
+  effects.limits[1].velocity = 1;
+  effects.damping = {{.row = 0, .coefficient = 0.01}, {.row = 1, .coefficient = 0.01}};
+  // at its upper limit and into it; faster than it may be; and so fast that it turns by more than pi, half a step too
+  Options options = weightless(1e-3);
+  options.max_splits = 1;
+  Simulation simulation(links_in_a_row(3), options, effects);
+  simulation.set_positions(std::vector<double>{0.3, 0.1, 0});
+  simulation.set_velocities(std::vector<double>{0.7, 2, 1e4});
+  const std::vector<double> q(simulation.positions().begin(), simulation.positions().end()), v = simulation.velocities();
+  const double energy = simulation.energy().total();
+  REQUIRE_FALSE(simulation.step().ok());
+  CHECK(std::ranges::equal(simulation.positions(), q));
+  CHECK(simulation.velocities() == v);
+  CHECK(simulation.energy().total() == energy);
+  CHECK(simulation.effect_work().limits == 0);
 }
 
 TEST_CASE("what bounces ever lower under gravity comes to rest on its limit", "[blows]") {
