@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "layout/input_error.hpp"
 #include "layout/urdf.hpp"
 #include "tests/layout/robots.hpp"
 
@@ -15,15 +14,6 @@ using Catch::Matchers::StartsWith;
 using Strings = std::vector<std::string>;
 
 namespace {
-
-/// What reading says: the warnings, or "error: " and the message.
-Strings told_of(const std::string& xml) {
-  try {
-    return parse_urdf(xml, "test.urdf").warnings;
-  } catch (const InputError& error) {
-    return {fmt::format("error: {}", error.what())};
-  }
-}
 
 /// A link with its centre of mass, and moments without products.
 std::string solid(const std::string& name, const std::string& mass, const std::string& center, const std::string& moments) {

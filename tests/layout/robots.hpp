@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "layout/input_error.hpp"
 #include "layout/model.hpp"
+#include "layout/urdf.hpp"
 
 #ifndef LINDEN_ROBOTS_DIR
 #define LINDEN_ROBOTS_DIR "../shared/robots"
@@ -74,6 +76,15 @@ inline std::string joint(const std::string& name, const std::string& type, const
                          const std::string& more = "") {
   return fmt::format(R"(<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/>{}</joint>)", name, type,
                      parent, child, more);
+}
+
+/// What reading says: the warnings, or "error: " and the message.
+inline std::vector<std::string> told_of(const std::string& xml) {
+  try {
+    return parse_urdf(xml, "test.urdf").warnings;
+  } catch (const InputError& error) {
+    return {fmt::format("error: {}", error.what())};
+  }
 }
 
 }  // namespace linden

@@ -22,15 +22,6 @@ using Strings = std::vector<std::string>;
 
 namespace {
 
-/// What reading says: the warnings, or "error: " and the message.
-Strings told_of(const std::string& xml) {
-  try {
-    return parse_urdf(xml, "test.urdf").warnings;
-  } catch (const InputError& error) {
-    return {fmt::format("error: {}", error.what())};
-  }
-}
-
 /// A hinge in lines 2 to 4; `of_link` is in line 3, `of_joint` in line 4, `of_robot` in line 5.
 std::string hinge(const std::string& of_joint, const std::string& of_link = "", const std::string& of_robot = "") {
   return "<robot name=\"r\">\n" + link("a") + "\n" + link("b", of_link) + "\n" + joint("j", "continuous", "a", "b", of_joint) + "\n" +
