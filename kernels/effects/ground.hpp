@@ -13,7 +13,8 @@
 // corner that of the middle of it. Where a feature takes over from another, depth is found that no motion made. It must not become energy:
 // on a terrain the points of a body store no more at the beginning of a step than they did at the end of the last one (bore), and their
 // depths are all reduced by one factor where they would; what is missing comes back at kRecovery (engine/step/effect_plan.cpp). Without this
-// one shape in two that tumbles over rough ground was given energy, a disc up to 89 J of 5; with it none more than 2 %. At a recovery of 10 mm/s
+// one shape in two that tumbles over rough ground was given energy, a disc up to 89 J of 5. With it, of 200 shapes that tumbled for 3 s at 0.5
+// to 2 ms, 24 rose by more than 0.02 J and none by more than 0.21 J of 2 to 22 J; the most without damping at 2 ms. At a recovery of 10 mm/s
 // it was 1 % more. Energy is lost where a gap is less than it was, to the second order of the step over an edge that turns down.
 //
 // t = D_c + phi x o without its part along the normal: o from the centre to where the shapes touch, D_c and phi displacement and turn of the

@@ -385,6 +385,19 @@ class Maker {
       fall = -mass * 9.81 / (ground.stiffness * points);
     }
     scene_.effects.ground->height = lowest - fall;
+    if (scene_.number % 4 == 0) make_rough();
+  }
+
+  /// Hills below the lowest point, around where the bodies are; numbers of its own, so that all else is as it would be on a plane.
+  void make_rough() {
+    constexpr Index kAcross = 61;
+    Random random(scene_.seed * 7919 + scene_.number);
+    const double spacing = 0.05 * std::pow(10.0, random.uniform(0, 1)), steepness = random.uniform(0.1, 0.6);
+    HeightField field{.columns = kAcross, .rows = kAcross, .spacing_x = spacing, .spacing_y = spacing, .origin_x = -30.3 * spacing,
+                      .origin_y = -29.6 * spacing, .heights = {}};
+    for (Index k = 0; k < kAcross * kAcross; ++k) field.heights.push_back(-steepness * spacing * random.uniform(0, 1));
+    scene_.effects.ground->terrain = std::move(field);
+    scene_.rough = true;
   }
 
   /// To the end of the motion, for what has one; a long look now and then.
@@ -423,7 +436,7 @@ std::string EverydayScene::text() const {
   name(!effects.wrenches.empty(), "wrenches");
   name(!effects.torques.empty(), "torques");
   name(!effects.drag.empty(), "drag");
-  name(effects.ground.has_value(), "ground");
+  name(effects.ground.has_value(), rough ? "rough ground" : "ground");
   const bool floats = model->tree.shape.slots > 1 && model->tree.kind(1) == JointKind::free;
   return fmt::format("{}{}, {} {}{}, {} base, h = {:.3g} ms, {} steps; {}", stiff ? "stiff " : "", kind, model->tree.bodies(),
                      model->tree.bodies() == 1 ? "body" : "bodies", model->mimics.empty() ? "" : ", ties", floats ? "floating" : "fixed",

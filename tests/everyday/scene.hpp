@@ -31,6 +31,7 @@ struct EverydayScene {
   bool stiff = false;        // a rate of it is faster than the step: it must be stable, but is not compared at this step
   bool bends = false;        // forces that jump or bend between steps
   bool sudden = false;       // friction, limits or ground
+  bool rough = false;        // the ground is a terrain, which the plain simulator does not know
   std::string kind;          // what it is mostly about
 
   /// "servo: 3 joints, 2 kinds, fixed base, h = 1.2 ms, 400 steps; gravity, servos"
