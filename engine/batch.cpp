@@ -91,7 +91,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, applied, mass, targets, frictions, excess_before, reading, bend, contacts;
+  Numbers<Real> q, p, applied, mass, targets, frictions, excess_before, reading, bend, kept;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -117,7 +117,7 @@ struct BatchOf<Real>::Data {
       reading.resize(rows(shape().velocities));
       bend.assign(rows(shape().velocities), Real(kAnyBend));
     }
-    contacts.resize(rows(plan.ground.kept()));
+    kept.resize(rows(plan.kept()));
     records.resize(static_cast<std::size_t>(size));
     const std::vector<double> neutral = model->neutral();
     for_blocks([&](std::int64_t b, Worker&) {
@@ -147,7 +147,7 @@ struct BatchOf<Real>::Data {
             excess_before.empty() ? nullptr : excess_before.data() + at(b, nv),
             reading.empty() ? nullptr : reading.data() + at(b, nv),
             bend.empty() ? nullptr : bend.data() + at(b, nv),
-            contacts.empty() ? nullptr : contacts.data() + at(b, plan.ground.kept()),
+            kept.empty() ? nullptr : kept.data() + at(b, plan.kept()),
             records.data() + b * lanes,
             static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
   }
@@ -194,6 +194,7 @@ struct BatchOf<Real>::Data {
   void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
     alone.forget();
     std::ranges::copy(positions, alone.state().q.flat().begin());
+    plan.put_positions(0, alone.state().q.flat());
     normalise_positions(*model, alone.state().q.flat());
     for (std::size_t k = 0; k < velocities.size(); ++k) {
       if (!std::isfinite(velocities[k])) throw InputError(fmt::format("velocity \"{}\" is {}", model->names.velocity[k], velocities[k]));
@@ -204,7 +205,9 @@ struct BatchOf<Real>::Data {
         for (int k = 0; k < 10; ++k) inertia(slot, k) = static_cast<double>(mass_row(i, slot)[k * lanes]);
       }
     }
-    alone.set_velocities(velocities);
+    std::vector<double> rates(velocities.begin(), velocities.end());
+    plan.put_velocities(0, rates);
+    alone.set_velocities(rates);
     const BatchView<Real> to_q(q, shape().positions, lanes, size), to_p(p, shape().velocities, lanes, size);
     for (Index row = 0; row < shape().positions; ++row) to_q(i, row) = static_cast<Real>(alone.state().q(row));
     for (Index row = 0; row < shape().velocities; ++row) to_p(i, row) = static_cast<Real>(alone.state().p(row));
@@ -217,7 +220,7 @@ struct BatchOf<Real>::Data {
     clear(excess_before, shape().velocities);
     clear(reading, shape().velocities);
     clear(bend, shape().velocities, kAnyBend);
-    clear(contacts, plan.ground.kept());
+    clear(kept, plan.kept());
     records[static_cast<std::size_t>(i)] = {};
   }
 };
@@ -236,6 +239,7 @@ template <class Real>
 BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options, const Effects& effects) {
   check_batch(size, options);
   data_ = std::make_unique<Data>(required(std::move(model)), size, options, effects);
+  if (!effects.motions.empty()) reset_all([](std::int64_t, std::span<double>, std::span<double>) {});
 }
 
 template <class Real>
@@ -423,7 +427,7 @@ template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
   std::size_t numbers = 0;
   for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->frictions,
-                                    &data_->excess_before, &data_->reading, &data_->bend, &data_->contacts}) {
+                                    &data_->excess_before, &data_->reading, &data_->bend, &data_->kept}) {
     numbers += some->size();
   }
   return numbers * sizeof(Real) +

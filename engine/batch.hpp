@@ -103,7 +103,7 @@ class BatchOf {
   int threads() const;
   Instructions instructions() const;
 
-  /// Starts instance i anew, its record cleared: positions [nq], velocities [nv], conventions and errors as Simulation's. Others are not
+  /// Starts instance i anew at time 0, its record cleared: positions [nq], velocities [nv], conventions and errors as Simulation's. Others are not
   /// touched; several threads may reset different instances at once.
   void reset(std::int64_t i, std::span<const double> positions, std::span<const double> velocities);
   /// reset of every instance on all threads; start(i, positions, velocities) fills both, given as the neutral state at rest.

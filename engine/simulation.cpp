@@ -41,6 +41,7 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
   }
   watch_.emplace(*model_, plan_->effects);
   changed();
+  if (!plan_->curves.empty()) set_positions(model_->neutral());
 }
 
 Simulation::Simulation(const Scene& scene) : Simulation(scene.model, scene.options, scene.effects) {
@@ -72,6 +73,7 @@ std::vector<double> Simulation::velocities() {
 void Simulation::set_positions(std::span<const double> q) {
   check_row_count("positions", q.size(), model_->tree.shape.positions);
   std::vector<double> given(q.begin(), q.end());
+  plan_->put_positions(time(), given);
   normalise_positions(*model_, given);
   const std::vector<double> rates = velocities();
   std::ranges::copy(given, state_.q.flat().begin());
@@ -85,6 +87,7 @@ void Simulation::set_velocities(std::span<const double> v) {
     if (!std::isfinite(v[i])) throw InputError(fmt::format("velocity {} is {}", quoted(model_->names.velocity[i]), v[i]));
   }
   std::ranges::copy(v, rate_.flat().begin());
+  plan_->put_velocities(time(), rate_.flat());
   spread_mimics<double>(model_->mimics, rate_);
   stepper_->momentum_of(rate_, state_.p);
   changed();
@@ -119,6 +122,13 @@ void Simulation::set_friction(std::span<const double> forces) {
     }
   }
   std::ranges::copy(forces, to.begin());
+}
+
+std::vector<double> Simulation::motion_forces() const {
+  std::vector<double> forces;
+  const auto count = static_cast<Index>(plan_->curves.size());
+  for (Index k = plan_->kept() - count; k < plan_->kept(); ++k) forces.push_back(stepper_->kept(k));
+  return forces;
 }
 
 void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, const std::array<double, 3>& moment) {

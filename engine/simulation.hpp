@@ -38,7 +38,7 @@ struct Momentum {
 
 class Simulation {
  public:
-  /// At rest in the model's zero configuration. Throws InputError for options and effects that make no sense, and for a null pointer.
+  /// At rest in the model's zero configuration, but for joints whose motion is given. Throws InputError for options and effects that make no sense, and for a null pointer.
   explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
   explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
   /// At the start of the scene (engine/scene/scene.hpp).
@@ -55,7 +55,7 @@ class Simulation {
   std::vector<double> velocities();
 
   /// Throw InputError for a wrong count or a number that is not finite. Quaternions are normalised; mimic joints follow their
-  /// leaders whatever is given for them. set_positions keeps the velocities, not the momenta.
+  /// leaders, and joints whose motion is given are where it is, whatever is given for them. set_positions keeps the velocities, not the momenta.
   void set_positions(std::span<const double> q);
   void set_velocities(std::span<const double> v);
 
@@ -69,6 +69,9 @@ class Simulation {
   void set_servo_targets(std::span<const double> targets);
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none negative.
   void set_friction(std::span<const double> forces);
+
+  /// Forces [N m, N] of the motions that the effects give, in the order of Effects::motions: those that made the last step, at its beginning.
+  std::vector<double> motion_forces() const;
 
   /// The first wrench that the effects name on a body, from now on: force [N] and moment [N m] in the directions and at the point that it
   /// was given with. Throws InputError where the effects name none on that body (one of zero will do) or a number is not finite.

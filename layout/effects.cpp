@@ -173,6 +173,15 @@ class Checker {
       require_screw(entry.row);
       require_course("force", entry.force);
     });
+    once("motions", effects_.motions, [&](const JointMotion& entry) {
+      require_screw(entry.row);
+      require_course("position", entry.position);
+      const auto twice = std::ranges::adjacent_find(entry.position.times);
+      if (twice != entry.position.times.end())
+        fail(fmt::format("{} is at two places at {} s", row_text(model_, entry.row), *twice), "one position a time", "leave one out");
+    });
+    refuse_moved("friction", effects_.friction);
+    refuse_moved("limits", effects_.limits);
     each("wrenches", effects_.wrenches, [&](const BodyWrench& entry) {
       require_slot(entry.slot);
       for (int k = 0; k < 3; ++k) {
@@ -220,6 +229,14 @@ class Checker {
       look(entry);
       if (!seen.insert(entry.row).second)
         fail(row_text(model_, entry.row) + " is named twice", "one entry a joint", "leave one out");
+    });
+  }
+
+  template <class Entry>
+  void refuse_moved(const char* list_name, const std::vector<Entry>& list) {
+    each(list_name, list, [&](const Entry& entry) {
+      if (std::ranges::find(effects_.motions, entry.row, &JointMotion::row) != effects_.motions.end())
+        fail(fmt::format("the motion of {} is given", row_text(model_, entry.row)), "a joint that moves by itself", "leave it out");
     });
   }
 

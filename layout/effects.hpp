@@ -93,6 +93,13 @@ struct JointTorque {
   Course force;  // [N m, N]
 };
 
+/// Moves a joint as given, along the smooth curve through the points (layout/smooth_curve.hpp), with whatever force that takes. It has
+/// neither friction nor limits of its own.
+struct JointMotion {
+  Index row;
+  Course position;  // [rad, m]; no two times are equal
+};
+
 /// A wrench on a body.
 struct BodyWrench {
   Index slot;
@@ -144,6 +151,7 @@ struct Effects {
   std::vector<JointLimit> limits;
   std::vector<Servo> servos;
   std::vector<JointTorque> torques;
+  std::vector<JointMotion> motions;
   std::vector<BodyWrench> wrenches;
   std::vector<Drag> drag;
   std::array<double, 3> wind{0, 0, 0};  // [m/s], world frame
@@ -187,7 +195,7 @@ bool act_from_outside(const Effects& effects);
 
 /// Throws InputError where an effect names what is not there or cannot have it (a row out of range, a screw's effect on a ball or
 /// free joint or on a mimic joint's follower), holds a number that makes no sense, or meets another of its kind where there can be
-/// only one: friction, limits and servos.
+/// only one: friction, limits and servos; or, where a joint's motion is given, none of the first two.
 void check(const Effects& effects, const Model& model);
 
 }  // namespace linden

@@ -128,6 +128,10 @@ std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model)
         std::ranges::count_if(effects.torques, [](const JointTorque& entry) { return entry.force.times.size() > 1; });
     return tables == 0 ? std::string("constant") : fmt::format("{} over time", tables);
   });
+  on_joints("motion", effects.motions, [&] {
+    const auto tables = std::ranges::count_if(effects.motions, [](const JointMotion& entry) { return entry.position.times.size() > 1; });
+    return tables == 0 ? std::string("held in place") : fmt::format("{} over time", tables);
+  });
   if (!effects.wrenches.empty()) {
     add("wrench", counted(bodies_of(effects.wrenches), "body"), range_text(effects.wrenches, [](const BodyWrench& entry) {
                                                                   return std::hypot(entry.force[0], entry.force[1],
@@ -188,6 +192,9 @@ Json effects_json(const Effects& effects, const Model& model) {
   });
   list("torque", effects.torques, [&](const JointTorque& e) {
     return Json{{"joint", joint(e.row)}, {"force", course(e.force)}};
+  });
+  list("motion", effects.motions, [&](const JointMotion& e) {
+    return Json{{"joint", joint(e.row)}, {"position", course(e.position)}};
   });
   list("wrench", effects.wrenches, [&](const BodyWrench& e) {
     return Json{{"body", body(e.slot)},

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "engine/scene/number_table.hpp"
+#include "engine/text.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
@@ -19,7 +20,7 @@ using Kind = SceneValue::Kind;
 using Entry = SceneValue::Entry;
 
 const std::vector<std::string> kEffects{"gravity", "armature", "damping", "friction", "spring", "limits",
-                                        "servo",   "torque",   "wrench",  "drag",     "ground"};
+                                        "servo",   "torque",   "motion",  "wrench",   "drag",   "ground"};
 const std::vector<std::string> kSpring{"stiffness", "rest"};
 const std::vector<std::string> kLimit{"lower", "upper", "restitution", "velocity"};
 const std::vector<std::string> kServo{"stiffness", "damping", "max_force", "targets", "velocities", "feedforward", "joints"};
@@ -73,6 +74,7 @@ class Reader {
       if (key == "limits") limits(value);
       if (key == "servo") servo(value);
       if (key == "torque") torque(value);
+      if (key == "motion") motion(value);
       if (key == "wrench") wrench(value);
       if (key == "drag") drag(value);
       if (key == "ground") ground(value);
@@ -80,6 +82,7 @@ class Reader {
         result_.warnings[k] = fmt::format("{}: {}", value.place(), result_.warnings[k]);
       }
     }
+    leave_to_motions(at);
     at.located([&] { check(result_.effects, model_); });
     return std::move(result_);
   }
@@ -371,6 +374,44 @@ class Reader {
       result_.effects.torques.push_back({named.row, course(entry.value)});
     }
     if (result_.effects.torques.empty()) warn("no joint has any");
+  }
+
+  void motion(const SceneValue& at) {
+    for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values}}")) {
+      const NamedJoint named = screw(entry);
+      refuse_follower(entry.value, named);
+      const Course positions = course(entry.value);
+      const auto twice = std::ranges::adjacent_find(positions.times);
+      if (twice != positions.times.end())
+        entry.value.fail(fmt::format("{} is at two places at {} s", entry.value.path(), *twice), "one position a time",
+                         "leave one out; a servo can have a target that jumps");
+      result_.effects.motions.push_back({named.row, positions});
+    }
+    if (result_.effects.motions.empty()) warn("no joint has any");
+  }
+
+  /// A joint whose motion is given feels neither friction nor limits; it is not to be led beyond them.
+  void leave_to_motions(const SceneValue& at) {
+    const auto moved = [&](const auto& entry) {
+      return std::ranges::find(result_.effects.motions, entry.row, &JointMotion::row) != result_.effects.motions.end();
+    };
+    for (const JointLimit& limit : result_.effects.limits) {
+      const auto found = std::ranges::find(result_.effects.motions, limit.row, &JointMotion::row);
+      if (found == result_.effects.motions.end()) continue;
+      for (std::size_t k = 0; k < found->position.values.size(); ++k) {
+        const double value = found->position.values[k];
+        if (value >= limit.lower && value <= limit.upper) continue;
+        at.find("motion")->fail(fmt::format("effects.motion leads {} to {} at {} s, beyond its limits of {} to {}",
+                            linden::quoted(model_.names.velocity[static_cast<std::size_t>(limit.row)]), value, found->position.times[k],
+                            limit.lower, limit.upper),
+                "positions within them", "change the table, or leave the joint out of limits");
+      }
+    }
+    std::erase_if(result_.effects.limits, moved);
+    if (const auto left_out = std::erase_if(result_.effects.friction, moved); left_out > 0) {
+      warn(fmt::format("{}: left out where the motion is given ({}): what drives a joint overcomes it", at.find("friction")->place(),
+                       counted(static_cast<std::int64_t>(left_out), "joint")));
+    }
   }
 
   Course course(const SceneValue& at) const {

@@ -55,6 +55,7 @@ class SceneReader {
       SceneEffects read = read_effects(*effects, scene_.model, scene_.initial.positions, folder_);
       scene_.effects = std::move(read.effects);
       scene_.options.gravity = read.gravity;
+      if (initial) refuse_given(*initial);
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
       if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
@@ -62,6 +63,20 @@ class SceneReader {
   }
 
  private:
+  /// A joint whose motion is given starts where that does.
+  void refuse_given(const SceneValue& initial) const {
+    for (const char* key : {"positions", "velocities"}) {
+      const auto values = initial.find(key);
+      if (!values || values->is(Kind::nothing)) continue;
+      for (const SceneValue::Entry& entry : values->entries("a map of joints")) {
+        const Index row = row_of(scene_.model, entry.key);
+        if (std::ranges::find(scene_.effects.motions, row, &JointMotion::row) == scene_.effects.motions.end()) continue;
+        entry.value.fail(fmt::format("the motion of joint {} is given", linden::quoted(entry.key)), "a joint that moves by itself",
+                         "leave it out: it starts where effects.motion does");
+      }
+    }
+  }
+
   void warn_of_stiff_ground(const SceneValue& at) {
     const std::optional<StiffContact> stiff = stiffest_unresolved(scene_.model, scene_.options, scene_.effects);
     if (!stiff) return;

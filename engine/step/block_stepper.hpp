@@ -58,7 +58,7 @@ struct Block {
   Real* excess_before;        // [nv] see EffectMemory; null: no effects
   Real* reading;              // [nv] likewise
   Real* bend;                 // [nv] likewise
-  Real* contacts;             // [points] how each contact point ended the last step (EffectSweeps::contact); null: none
+  Real* kept;                 // [EffectPlan::kept] (EffectSweeps::kept); null: none
   InstanceRecord* instances;  // [W]
   int count;                  // instances in use, 1 to W
 };

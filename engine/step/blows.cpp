@@ -64,7 +64,7 @@ double Blows::strike(State<double>& state, bool arrived, int& blows) {
     if (blows > before) {
       sweeps_.apply_mass_inverse(unit_, response_);
     } else {
-      sweeps_.velocity_of(unit_, response_);
+      sweeps_.response_to(unit_, response_);
     }
     const double impulse = (target - velocity_(row)) / response_(row);
     taken -= impulse * (velocity_(row) + 0.5 * impulse * response_(row));

@@ -52,6 +52,7 @@ std::string irreversible(const Effects& effects) {
   refuse(!effects.limits.empty(), "limits");
   refuse(!effects.servos.empty(), "servo");
   refuse(!effects.torques.empty(), "torque");
+  refuse(!effects.motions.empty(), "motion");
   refuse(!effects.wrenches.empty(), "wrench");
   refuse(!effects.drag.empty(), "drag");
   refuse(effects.ground.has_value(), "ground");
@@ -65,6 +66,7 @@ std::string sudden(const Effects& effects) {
   if (std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); })) {
     found.push_back("servo with limited force");
   }
+  if (!effects.motions.empty()) found.push_back("motion");
   if (effects.ground) found.push_back("ground");
   return fmt::format("{}", fmt::join(found, ", "));
 }

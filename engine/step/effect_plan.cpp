@@ -143,7 +143,8 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
 
   bodies = !effects.drag.empty() || !effects.wrenches.empty() || !points.empty();
   joints = !effects.armature.empty() || !effects.springs.empty() || !effects.ball_springs.empty() || !effects.damping.empty() ||
-           !effects.friction.empty() || !effects.limits.empty() || !effects.servos.empty() || !effects.torques.empty();
+           !effects.friction.empty() || !effects.limits.empty() || !effects.servos.empty() || !effects.torques.empty() || !effects.motions.empty();
+  for (const JointMotion& motion : effects.motions) curves.emplace_back(motion.position);
   springs = !effects.springs.empty() || !effects.ball_springs.empty() || !points.empty();
   balls = !effects.ball_springs.empty() || std::ranges::any_of(effects.damping, [&](const JointDamping& damper) {
     return std::ranges::none_of(tree.runs, [&](const Run& run) {
@@ -213,6 +214,14 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
   collect(effects.wrenches, &TouchedBody::wrenches);
   collect(points, &TouchedBody::points);
   for (const auto& [slot, body] : by_slot) touched.push_back(body);
+}
+
+void EffectPlan::put_positions(double time, std::span<double> q) const {
+  for (std::size_t k = 0; k < curves.size(); ++k) q[static_cast<std::size_t>(q_row(effects.motions[k].row))] = curves[k].at(time);
+}
+
+void EffectPlan::put_velocities(double time, std::span<double> v) const {
+  for (std::size_t k = 0; k < curves.size(); ++k) v[static_cast<std::size_t>(effects.motions[k].row)] = curves[k].slope(time);
 }
 
 }  // namespace linden

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "kernels/effects/ground_plan.hpp"
 #include "layout/effects.hpp"
 #include "layout/model.hpp"
+#include "layout/smooth_curve.hpp"
 
 namespace linden {
 
@@ -48,6 +50,7 @@ struct EffectPlan {
   bool springs = false;  // some potential beside gravity's
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
   bool bounces = false;  // some limit has a restitution
+  std::vector<SmoothCurve> curves;  // of every given motion
   bool servos_move = false;  // some servo has a table
   bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
   bool bends = false;    // velocities are held to how the motion bends (velocity.md): something revises, or acts more at the beginning of a step
@@ -58,6 +61,11 @@ struct EffectPlan {
   Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
   GroundPlan ground;                // no points without ground
+  /// Joints whose motion is given are where it is at a time [s], whatever stands in q [nq], and as fast as it goes on from there.
+  void put_positions(double time, std::span<double> q) const;
+  void put_velocities(double time, std::span<double> v) const;
+  /// Numbers beside those of rows that are kept from step to step (EffectSweeps::kept).
+  Index kept() const { return ground.kept() + 3 * static_cast<Index>(curves.size()); }
   std::vector<TouchedBody> touched;  // sorted by slot
 };
 

@@ -23,6 +23,7 @@
 #include "kernels/effects/damping.hpp"
 #include "kernels/effects/drag.hpp"
 #include "kernels/effects/friction.hpp"
+#include "kernels/effects/given_motion.hpp"
 #include "kernels/effects/ground.hpp"
 #include "kernels/effects/limits.hpp"
 #include "kernels/effects/servo.hpp"
@@ -41,6 +42,9 @@ inline constexpr double kHeld = 1e36, kMostRead = 1e35;
 /// A velocity that is read is no farther from the mean one of the step that ended than this many times what that one differs from the mean
 /// of the step before it. Half as much is what a steady acceleration makes.
 inline constexpr double kMostBend = 1.5;
+
+/// Where within a step the velocity of a given motion is that with which it comes to the end: but for the rounding of times, there.
+inline constexpr double kComing = 1 - 1e-6;
 
 /// Numbers in a Scalar.
 template <class S>
@@ -97,6 +101,10 @@ class EffectSweeps {
       for (std::size_t k = 0; k < effects.friction.size(); ++k) {
         frictions_.force(static_cast<Index>(k)) = as<S>(effects.friction[k].force);
       }
+      motions_.entries = effects.motions;
+      for (Field<S>* field : {&motions_.end, &motions_.next_velocity, &motions_.velocity, &motions_.force, &motions_.steady}) {
+        rows(*field, effects.motions.size());
+      }
       limits_.entries = effects.limits;
       for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) rows(*field, effects.limits.size());
     }
@@ -140,13 +148,19 @@ class EffectSweeps {
     if (rotors_.rows() == 0) return action(NothingAdded{});
     action(EffectsAdded<S, true, false>{rotors_, bodies_.pull});
   }
+  /// And for what a blow does: a joint whose motion is given goes on as it does.
+  template <class Action>
+  void with_struck(const Action& action) {
+    if (motions_.entries.empty()) return with_rotors(action);
+    for (Index row = 0; row < reading_stiffness_.rows(); ++row) reading_stiffness_(row) = rotors_.rows() > 0 ? rotors_(row) : S(0.0);
+    for (const JointMotion& motion : motions_.entries) reading_stiffness_(motion.row) = as<S>(std::numeric_limits<double>::infinity());
+    action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
+  }
   /// And for the mass matrix that velocities are read with, after begin_reading: a joint that is held is taken out.
   template <class Action>
   void with_reading(const Action& action) const {
     action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
   }
-  /// How many numbers contact points keep from step to step.
-  Index contacts() const { return plan_.ground.kept(); }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
   /// To be written between steps; not a number: the target is that of the servo's table.
@@ -190,8 +204,19 @@ class EffectSweeps {
     std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
     begin_friction(frictions_, before, known, delta);
     begin_limits(limits_, plan_.q_row, h, q, before, known, passable, delta);
+    begin_motions(h, known, motions_);
+    for (Index k = 0; k < motions_.end.rows(); ++k) {
+      const SmoothCurve& curve = plan_.curves[static_cast<std::size_t>(k)];
+      motions_.end(k) = at_each_time<S>(times, [&](double t) LINDEN_INLINE_LAMBDA { return curve.at(t + step); });
+      motions_.next_velocity(k) =
+          at_each_time<S>(times, [&](double t) LINDEN_INLINE_LAMBDA { return curve.slope(t + kComing * step); });
+    }
+    put_motions(delta);
     assemble();
   }
+
+  /// Where a guess is given up for another: what is given stays.
+  void put_motions(Field<S>& delta) const { given_motion_map(motions_, plan_.q_row, *q_, delta); }
 
   /// Forces on bodies: impulse holds h mu.
   template <class Element>
@@ -243,26 +268,33 @@ class EffectSweeps {
   /// What the next step wants to know of this one: where contact points stick and how they moved, and what velocities are read with.
   auto memory() {
     return std::array{points_.closed.flat(), points_.slides.flat(), points_.bore.flat(), points_.rise_before.flat(), points_.slip_last.flat(),
-                      excess_before_.flat(), reading_.flat(), bend_.flat()};
+                      excess_before_.flat(), reading_.flat(), bend_.flat(), motions_.velocity.flat(), motions_.force.flat(),
+                      motions_.steady.flat()};
   }
   Field<S>& excess_before() { return excess_before_; }
   Field<S>& reading() { return reading_; }
   Field<S>& bend() { return bend_; }
 
-  /// The same of contact points alone, a number each: 0 apart, 1 sticks, 2 slides; on a terrain another, what it bore.
-  S contact(Index k) const {
-    const Index count = points_.slides.rows();
-    return k < count ? points_.closed(k) * (S(1.0) + points_.slides(k)) : points_.bore(k - count);
+  /// What is kept beside the numbers of rows, EffectPlan::kept() of them: of each contact point 0 apart, 1 sticks, 2 slides, and on a terrain
+  /// what it bore; of each given motion velocity, steady force and force.
+  S kept(Index k) const {
+    const Index count = points_.slides.rows(), ground = plan_.ground.kept(), motions = motions_.end.rows();
+    if (k < count) return points_.closed(k) * (S(1.0) + points_.slides(k));
+    if (k < ground) return points_.bore(k - count);
+    return (*std::array{&motions_.velocity, &motions_.steady, &motions_.force}[static_cast<std::size_t>((k - ground) / motions)])((k - ground) % motions);
   }
-  void set_contact(Index k, const S& contact) {
-    const Index count = points_.slides.rows();
-    if (k >= count) {
-      points_.bore(k - count) = contact;
-      return;
+  void set_kept(Index k, const S& number) {
+    const Index count = points_.slides.rows(), ground = plan_.ground.kept(), motions = motions_.end.rows();
+    if (k < count) {
+      points_.closed(k) = select(number > S(0.5), S(1.0), S(0.0));
+      points_.slides(k) = select(number > S(1.5), S(1.0), S(0.0));
+    } else if (k < ground) {
+      points_.bore(k - count) = number;
+    } else {
+      (*std::array{&motions_.velocity, &motions_.steady, &motions_.force}[static_cast<std::size_t>((k - ground) / motions)])((k - ground) % motions) = number;
     }
-    points_.closed(k) = select(contact > S(0.5), S(1.0), S(0.0));
-    points_.slides(k) = select(contact > S(1.5), S(1.0), S(0.0));
   }
+  const GivenMotions<S>& motions() const { return motions_; }
 
   /// Friction that is smooth up to this speed, until harden. joints() then goes by delta alone.
   void soften(double creep, Field<S>& delta) {
@@ -300,6 +332,7 @@ class EffectSweeps {
     joint_impulses_end_map(sum_, h_, delta, end);
     if (!plan_.effects.ball_springs.empty()) ball_spring_end_map(plan_.effects.ball_springs, tree_, h_, *q_, motion, end);
     const S most = as<S>(std::numeric_limits<typename ElementOf<S>::type>::max()), zero(0.0);
+    end_motions(residual, motions_);
     for (Index row = 0; row < end.rows(); ++row) {
       S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
       if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
@@ -313,6 +346,7 @@ class EffectSweeps {
       residual(row) = select(held, zero, residual(row));
       excess_(row) = excess;
     }
+    for (const JointMotion& one : motions_.entries) excess_(one.row) = zero;  // what moves it is no stop
   }
 
   /// At the end of a step, once the bodies are where it leaves them: what velocities are read from beside p (engine/step/velocity.md).
@@ -341,6 +375,10 @@ class EffectSweeps {
       const S bend = select(known && !stopped, rate * abs(delta(row) - before(row)), any);
       bend_(row) = select(moves, bend, bend_(row));
     }
+    for (const JointMotion& motion : motions_.entries) {
+      reading_(motion.row) = select(moves, as<S>(kHeld), reading_(motion.row));
+      bend_(motion.row) = any;
+    }
   }
   /// A velocity that was read so, no farther from the mean one of the last step than the motion bends, and no faster than a limit
   /// of velocity lets it be.
@@ -361,6 +399,13 @@ class EffectSweeps {
       reading_stiffness_(row) = select(held, infinite, rotors_.rows() > 0 ? rotors_(row) : zero);
     }
   }
+  /// Velocities of joints whose motion is given, all others zero; none is known of a start.
+  void given_velocities(Field<S>& v) const {
+    std::ranges::fill(v.flat(), S(0.0));
+    for (Index k = 0; k < motions_.end.rows(); ++k) {
+      if (reading_(motions_.row(k)) > S(kMostRead)) v(motions_.row(k)) = motions_.velocity(k);
+    }
+  }
   /// A joint that was held is to be struck; one that was struck has come to rest.
   void release(Index row) {
     if (reading_(row) > S(kMostRead)) reading_(row) = S(0.0);
@@ -369,6 +414,7 @@ class EffectSweeps {
   /// A blow has changed all velocities to those of these momenta.
   void read_as(const Field<S>& momentum, const Field<S>& p) {
     for (Index row = 0; row < p.rows(); ++row) reading_(row) = momentum(row) - p(row);
+    for (const JointMotion& motion : motions_.entries) reading_(motion.row) = S(kHeld);
     std::ranges::fill(bend_.flat(), S(kAnyBend));
   }
   const Limits<S>& limits() const { return limits_; }
@@ -381,6 +427,9 @@ class EffectSweeps {
     clear(points_.closed);
     clear(points_.slides);
     clear(points_.bore);
+    clear(motions_.velocity);
+    clear(motions_.force);
+    clear(motions_.steady);
   }
 
   /// Work of each effect in the step that was solved last; `q` and the ground as they were at its beginning. before: displacement of the
@@ -400,6 +449,7 @@ class EffectSweeps {
       limit_loss(limits_, h_, residual, delta, before, into(work.limits, account.limits));
       work.servo = servo_work(servos_, plan_.q_row, h_, *q_, delta, before);
       work.torque = torque_work(plan_.effects.torques, force_, delta);
+      work.motion = motion_work(motions_, h_, residual, delta, before);
     }
     if (plan_.bodies) {
       const auto drag = into(work.drag, account.drag);
@@ -419,6 +469,7 @@ class EffectSweeps {
       if (any) visit(name, std::move(call));
     };
     const bool points = !plan_.ground.points.empty();
+    on(!effects.motions.empty(), "given_motion_map", [=, this, &work] { put_motions(work.delta); });
     on(!effects.limits.empty(), "begin_limits", [=, this, &q, &work] { begin_limits(limits_, plan_.q_row, h_, q, work.delta, true, false, work.delta); });
     on(!effects.friction.empty(), "begin_friction", [=, this, &work] { begin_friction(frictions_, work.delta, true, work.delta); });
     on(!effects.armature.empty(), "armature_map", [=, this] { armature_map(plan_.effects.armature, sum_); });
@@ -490,6 +541,7 @@ class EffectSweeps {
     friction_map(frictions_, h_, creep_, sum_);
     if (creep_ == 0) hold_friction(frictions_, sum_);
     hold_limits(limits_, sum_);
+    hold_motions(motions_, sum_);
   }
   void clear_bodies() {
     for (Index i = 0; i < tree_.shape.slots; ++i) clear_body(bodies_, i);
@@ -511,6 +563,7 @@ class EffectSweeps {
   Field<S> set_targets_;  // of each servo, from outside; not a number where its table says
   Frictions<S> frictions_;
   Limits<S> limits_;
+  GivenMotions<S> motions_;
   Field<S> force_;  // of each given torque
   BodyImpulses<S> bodies_;
   GroundPoints<S> points_;

@@ -15,6 +15,7 @@ namespace linden {
   FIELD(limits, "taken")              \
   FIELD(servo, "given")               \
   FIELD(torque, "given")              \
+  FIELD(motion, "given")              \
   FIELD(wrench, "given")              \
   FIELD(drag, "taken")                \
   FIELD(ground, "taken")
@@ -36,7 +37,7 @@ struct EffectWork {
 #undef LINDEN_MAGNITUDE
     return sum;
   }
-  double given() const { return servo + torque + wrench; }
+  double given() const { return servo + torque + motion + wrench; }
   double taken() const { return damping + friction + limits + drag + ground; }
 };
 

@@ -27,8 +27,8 @@ class InstanceStepper {
   void forget();
   /// What effects keep of the step before, to be written, and of the step taken, to be read; see Stepper.
   EffectMemory effect_memory() { return stepper_->effect_memory(); }
-  double contact(Index k) const { return stepper_->contact(k); }
-  void set_contact(Index k, double contact) { stepper_->set_contact(k, contact); }
+  double kept(Index k) const { return stepper_->kept(k); }
+  void set_kept(Index k, double number) { stepper_->set_kept(k, number); }
   /// Targets of the plan's servos, to be written.
   std::span<double> servo_targets() { return stepper_->servo_targets(); }
   std::span<double> friction_forces() { return stepper_->friction_forces(); }

@@ -39,8 +39,8 @@ class LaneEffects {
     load(block.excess_before, sweeps_.excess_before());
     load(block.reading, sweeps_.reading());
     load(block.bend, sweeps_.bend());
-    for (Index k = 0; block.contacts != nullptr && k < sweeps_.contacts(); ++k) {
-      sweeps_.set_contact(k, L::load(block.contacts + k * W));
+    for (Index k = 0; block.kept != nullptr && k < sweeps_.plan().kept(); ++k) {
+      sweeps_.set_kept(k, L::load(block.kept + k * W));
     }
   }
   void store(const Block<Real>& block) {
@@ -107,7 +107,7 @@ class LaneEffects {
       memory.reading[row] = static_cast<double>(L::lane(sweeps_.reading()(static_cast<Index>(row)), l));
       memory.bend[row] = static_cast<double>(L::lane(sweeps_.bend()(static_cast<Index>(row)), l));
     }
-    for (Index k = 0; k < sweeps_.contacts(); ++k) alone.set_contact(k, static_cast<double>(block.contacts[k * W + l]));
+    for (Index k = 0; k < sweeps_.plan().kept(); ++k) alone.set_kept(k, static_cast<double>(block.kept[k * W + l]));
   }
   void keep_alone(const Block<Real>& block, int l, InstanceStepper& alone) {
     const EffectMemory memory = alone.effect_memory();
@@ -116,7 +116,7 @@ class LaneEffects {
       L::set_lane(sweeps_.reading()(static_cast<Index>(row)), l, memory.reading[row]);
       L::set_lane(sweeps_.bend()(static_cast<Index>(row)), l, memory.bend[row]);
     }
-    for (Index k = 0; k < sweeps_.contacts(); ++k) block.contacts[k * W + l] = static_cast<Real>(alone.contact(k));
+    for (Index k = 0; k < sweeps_.plan().kept(); ++k) block.kept[k * W + l] = static_cast<Real>(alone.kept(k));
   }
 
   /// The end of a step, of the lanes that took it together: impulses on bodies now, those of joints by add_end once the momenta are there.
@@ -124,10 +124,10 @@ class LaneEffects {
     const Mask moves = L::mask(done);
     if (done != 0 && sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, work.innovation, end_);
     if (done != 0 && sweeps_.plan().bodies) sweeps_.end_bodies(work.placement, work.displacement, work.impulse);
-    for (Index k = 0; k < sweeps_.contacts(); ++k) {
-      const Pack ended = select(moves, sweeps_.contact(k), L::load(block.contacts + k * W));
-      sweeps_.set_contact(k, ended);
-      L::store(ended, block.contacts + k * W);
+    for (Index k = 0; k < sweeps_.plan().kept(); ++k) {
+      const Pack ended = select(moves, sweeps_.kept(k), L::load(block.kept + k * W));
+      sweeps_.set_kept(k, ended);
+      L::store(ended, block.kept + k * W);
     }
   }
   template <class Element>

@@ -107,7 +107,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
     load(block);
     if constexpr (kEffects) effects_.load(block);
-    if (!model_.mimics.empty()) return observe_alone(block, velocities, energy);
+    bool alone = !model_.mimics.empty();
+    if constexpr (kEffects) alone = alone || !effects_->plan().curves.empty();
+    if (alone) return observe_alone(block, velocities, energy);
     const Pack potential = refresh();
     if constexpr (kEffects) {
       effects_->begin_reading(p_);
@@ -324,7 +326,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     Solved solved;
     effects_.begin(block, options_.step, q_, work_);
     Evaluation<Pack> now = start_down(tree_, constants(), work_);
-    if (effects_->contacts() > 0) effects_->guess_points(work_.displacement);
+    if (!effects_->plan().ground.points.empty()) effects_->guess_points(work_.displacement);
     Pack norm = effects_.act(constants(), work_, now);
     const Pack limit = number(std::numeric_limits<Real>::max());
     const Pack fall = number(fall_per_mass_) * as<Pack>(constants().subtree_mass(0));

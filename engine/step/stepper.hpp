@@ -58,9 +58,9 @@ class Stepper {
   virtual std::span<double> friction_forces() = 0;
   /// What effects keep of the step taken last; written where it is that of another state. Empty without effects.
   virtual EffectMemory effect_memory() = 0;
-  /// How contact point k ended the last step (EffectSweeps::contact), likewise.
-  virtual double contact(Index k) const = 0;
-  virtual void set_contact(Index k, double contact) = 0;
+  /// Number k of EffectSweeps::kept, likewise.
+  virtual double kept(Index k) const = 0;
+  virtual void set_kept(Index k, double number) = 0;
   /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
   virtual std::vector<std::span<double>> memory() = 0;
 

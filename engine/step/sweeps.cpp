@@ -33,6 +33,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
       add(true, {first, "impulse_pass_up, rate_down", "placement, gains, residual", "delta"});
       break;
   }
+  add(!effects.motions.empty(), {first, "given_motion_map", "motions, time, q", "delta"});
   add(!effects.limits.empty(), {first, "begin_limits", "q, history, delta", "limits, delta"});
   add(!effects.friction.empty(), {first, "begin_friction", "history, delta", "friction, delta"});
   add(!effects.armature.empty(), {first, "armature_map", "armature", "joint impulses"});

@@ -268,13 +268,13 @@ EffectMemory TreeStepper<kEffects>::effect_memory() {
 }
 
 template <bool kEffects>
-void TreeStepper<kEffects>::set_contact([[maybe_unused]] Index k, [[maybe_unused]] double contact) {
-  if constexpr (kEffects) effects_.set_contact(k, contact);
+void TreeStepper<kEffects>::set_kept([[maybe_unused]] Index k, [[maybe_unused]] double number) {
+  if constexpr (kEffects) effects_.set_kept(k, number);
 }
 
 template <bool kEffects>
-double TreeStepper<kEffects>::contact([[maybe_unused]] Index k) const {
-  if constexpr (kEffects) return effects_.contact(k);
+double TreeStepper<kEffects>::kept([[maybe_unused]] Index k) const {
+  if constexpr (kEffects) return effects_.kept(k);
   return 0;
 }
 
@@ -408,6 +408,10 @@ StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, d
   if (!now.usable()) {
     // no displacement at all is always within the range of log
     for (double& value : work_.delta.flat()) value = 0;
+    if constexpr (kEffects) {
+      if (effects_.plan().joints) effects_.put_motions(work_.delta);
+      spread_mimics<double>(sweeps_.mimics(), work_.delta);
+    }
     now = sweeps_.evaluate(true, report);
     fresh = true;
   }

@@ -41,8 +41,8 @@ class TreeStepper final : public Stepper {
   std::span<double> servo_targets() override;
   std::span<double> friction_forces() override;
   EffectMemory effect_memory() override;
-  double contact(Index k) const override;
-  void set_contact(Index k, double contact) override;
+  double kept(Index k) const override;
+  void set_kept(Index k, double number) override;
   std::vector<std::span<double>> memory() override;
   void read_velocity(const State<double>& state, Field<double>& v) override;
   void momentum_of(const Field<double>& v, Field<double>& p) override { sweeps_.momentum_of(v, p); }

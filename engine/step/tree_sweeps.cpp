@@ -58,6 +58,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       tree_(model.tree) {
   work_.allocate(model.tree.shape);
   if (holds_) mass_.allocate(model.tree.shape);
+  if (!plan.effects.motions.empty()) given_.allocate(model.tree.shape.velocities);
   is_long_chain_ = !kEffects && one_pass_ && options.order == 2 && is_long_chain(model.tree);
   shares_rows_ = !kEffects && one_pass_ && options.order == 2 && shares_rows(model.tree);
 }
@@ -511,6 +512,14 @@ void TreeSweeps<kEffects>::velocity_of(const Field<double>& p, Field<double>& v)
 }
 
 template <bool kEffects>
+void TreeSweeps<kEffects>::response_to(const Field<double>& impulse, Field<double>& v) {
+  if constexpr (kEffects) {
+    effects_.with_struck([&](const auto& added) { factor_mass(added); });
+    apply_mass_inverse(impulse, v);
+  }
+}
+
+template <bool kEffects>
 void TreeSweeps<kEffects>::momentum_of(const Field<double>& v, Field<double>& p) {
   place_all();
   velocity_down(model_.tree, *constants_, work_.placement, v, work_.twist);
@@ -526,8 +535,19 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
     read_ = p;
     effects_.begin_reading(read_);
     fold_mimics(ties_.mimics(), read_);
+    const bool given = given_.rows() > 0;
+    if (given) {
+      effects_.given_velocities(given_);
+      spread_mimics<double>(ties_.mimics(), given_);
+      momentum_of(given_, work_.increment);
+      for (Index row = 0; row < read_.rows(); ++row) read_(row) -= work_.increment(row);
+    }
     effects_.with_reading([&](const auto& added) { factor_mass(added); });
     apply_mass_inverse(read_, v);
+    if (given) {
+      for (Index row = 0; row < v.rows(); ++row) v(row) += given_(row);
+      momentum_of(v, read_);
+    }
     return read_;
   } else {
     velocity_of(p, v);

@@ -132,6 +132,8 @@ class TreeSweeps {
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
   void velocity_of(const Field<double>& p, Field<double>& v);
   void apply_mass_inverse(const Field<double>& p, Field<double>& v);
+  /// What an impulse makes of velocities at a blow, as velocity_of.
+  void response_to(const Field<double>& impulse, Field<double>& v);
   void momentum_of(const Field<double>& v, Field<double>& p);
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
@@ -194,6 +196,7 @@ class TreeSweeps {
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
   DownAndUp<Evaluated> tree_;
   Field<double> read_;  // see read_velocity
+  Field<double> given_;  // velocities of joints whose motion is given; no rows without
   MassFactor<double> mass_;  // empty where nothing is held
 };
 

@@ -40,7 +40,7 @@ struct GroundPlan {
   std::vector<GroundPoint> points;               // sorted by slot; those of one candidate together
   std::vector<double> share;                     // s of the normal force, one number a point
   double recovery = 0;                           // depth that may come back in a step without having been there before [m]
-  /// Numbers that the points keep from step to step (EffectSweeps::contact).
+  /// Numbers that the points keep from step to step (EffectSweeps::kept).
   Index kept() const { return static_cast<Index>(points.size()) * (ground.terrain ? 2 : 1); }
 };
 

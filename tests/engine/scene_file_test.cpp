@@ -334,6 +334,31 @@ TEST_CASE("servos hold the start, as strong as the motors are", "[scene]") {
   CHECK(effects(kHand, "  servo: {stiffness: 1}\n").servos.size() == static_cast<std::size_t>(hand.degrees_of_freedom()));
 }
 
+TEST_CASE("motions are numbers, tables or files; their joints start there and have neither friction nor limits", "[scene]") {
+  ScratchFolder folder;
+  folder.write("way.csv", "time,position\n0.5,0.2\n1,0.4\n");
+  folder.write("s.yaml", kArm + "effects:\n  friction: 0.1\n  limits: urdf\n"
+               "  motion: {joint_1: 0.3, joint_2: way.csv, joint_3: {times: [0, 1], values: [0.5, -0.5]}}\n");
+  const Scene read = load_scene(folder.file("s.yaml"));
+  REQUIRE(read.effects.motions.size() == 3);
+  CHECK(read.effects.motions[1].position.times == std::vector<double>{0.5, 1});
+  Simulation simulation(read);
+  CHECK(std::ranges::equal(simulation.positions().first(3), std::vector<double>{0.3, 0.2, 0.5}));
+  CHECK(simulation.velocities()[2] == Approx(-1));
+  for (const JointMotion& motion : read.effects.motions) {
+    CHECK(std::ranges::find(read.effects.friction, motion.row, &JointFriction::row) == read.effects.friction.end());
+    CHECK(std::ranges::find(read.effects.limits, motion.row, &JointLimit::row) == read.effects.limits.end());
+  }
+  CHECK(read.effects.friction.size() == read.model.names.velocity.size() - 3);
+  REQUIRE(std::ranges::any_of(read.model.warnings, [](const std::string& warning) {
+    return warning.find("effects.friction: left out where the motion is given (3 joints)") != std::string::npos;
+  }));
+  check_message(kArm + "effects:\n  limits: urdf\n  motion: {joint_1: {times: [0, 2], values: [0, 7]}}\n", 4,
+                {"effects.motion leads \"joint_1\" to 7 at 2 s, beyond its limits"});
+  check_message(kArm + "effects:\n  motion: {joint_1: {times: [0, 0], values: [0, 7]}}\n", 3, {"at two places at 0 s"});
+  check_message(kArm + "initial: {positions: {joint_1: 1}}\neffects: {motion: {joint_1: 0}}\n", 2, {"the motion of joint \"joint_1\" is given"});
+}
+
 TEST_CASE("torques are numbers, tables or files", "[scene]") {
   const Folder folder;
   folder.write("push.csv", "time,torque\n# comment\n0, 0\n\n1.5,2\r\n2,-1e-1\n");
@@ -536,7 +561,7 @@ TEST_CASE("unknown joints and links are refused with the nearest one", "[scene]"
   for (const char* effect :
        {"armature: {joint_22: 1}", "damping: {joint_22: 1}", "friction: {joint_22: 1}", "spring: {joint_22: {stiffness: 1}}",
         "limits: {joint_22: urdf}", "servo: {stiffness: 1, joints: [joint_22]}", "servo: {stiffness: 1, targets: {joint_22: 1}}",
-        "servo: {joints: {joint_22: {stiffness: 1}}}", "torque: {joint_22: 1}"}) {
+        "servo: {joints: {joint_22: {stiffness: 1}}}", "torque: {joint_22: 1}", "motion: {joint_22: 1}"}) {
     check_message(kArm + "effects:\n  gravity: [0, 0, 1]\n  " + effect + "\n", 4,
                   {"no joint \"joint_22\" moves", "did you mean \"joint_2\"?"});
   }
@@ -561,18 +586,18 @@ TEST_CASE("names of any length are cut in messages", "[scene]") {
 
 TEST_CASE("joints that cannot have an effect are refused by name", "[scene]") {
   for (const char* effect : {"armature: {base: 1}", "damping: {base: 1}", "friction: {base: 1}", "spring: {base: {stiffness: 1}}",
-                             "limits: {base: urdf}", "servo: {stiffness: 1, joints: [base]}", "torque: {base: 1}"}) {
+                             "limits: {base: urdf}", "servo: {stiffness: 1, joints: [base]}", "torque: {base: 1}", "motion: {base: 1}"}) {
     check_message(kHumanoid + "effects:\n  " + effect + "\n", 4, {"\"base\" is a free joint"});
   }
   for (const char* effect : {"armature: {joint2: 1}", "friction: {joint2: 1}", "limits: {joint2: {lower: 1}}",
-                             "servo: {stiffness: 1, joints: [joint2]}", "torque: {joint2: 1}"}) {
+                             "servo: {stiffness: 1, joints: [joint2]}", "torque: {joint2: 1}", "motion: {joint2: 1}"}) {
     check_message(std::string("model: ball-chain:2\neffects:\n  ") + effect + "\n", 3, {"\"joint2\" is a ball joint"});
   }
   const Model hand = load_urdf(LINDEN_MODELS_DIR "/hand.urdf");
   const std::string leader = hand.names.joint[static_cast<std::size_t>(hand.mimics.front().leader_slot)];
   const std::string follower = hand.names.joint[static_cast<std::size_t>(hand.mimics.front().follower_slot)];
   for (const std::string effect : {"spring: {JOINT: {stiffness: 1}}", "servo: {stiffness: 1, joints: [JOINT]}",
-                                   "torque: {JOINT: 1}", "servo: {stiffness: 1, targets: {JOINT: 1}}"}) {
+                                   "torque: {JOINT: 1}", "motion: {JOINT: 1}", "servo: {stiffness: 1, targets: {JOINT: 1}}"}) {
     std::string text = effect;
     text.replace(text.find("JOINT"), 5, follower);
     check_message(kHand + "effects:\n  " + text + "\n", 3, {fmt::format("\"{}\" follows another", follower), leader});

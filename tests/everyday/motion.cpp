@@ -209,6 +209,16 @@ double stops_leave(const EverydayScene& scene, const Walk& walk) {
   return limits + ground;
 }
 
+/// What drives a given motion does so at the beginning of a step: of its work, what that changes by from one step to the next.
+double motion_leaves(const Walk& walk) {
+  double most = 0;
+  for (std::size_t k = 2; k < walk.nodes.size(); ++k) {
+    const auto work = [&](std::size_t node) { return walk.nodes[node].work.motion - walk.nodes[node - 1].work.motion; };
+    most = std::max(most, std::abs(work(k) - work(k - 1)));
+  }
+  return 2 * most;
+}
+
 }  // namespace
 
 void check_energy(const EverydayScene& scene, const Walk& walk, Differences& found) {
@@ -253,7 +263,7 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
   const double rounding = (1e-8 + 4e-10 * static_cast<double>(walk.nodes.size())) * scale;
   // features of a terrain take over from one another; the engine itself tells what gives more than a hundredth
   constexpr double kRough = 0.02;
-  const double allowed = (scene.rough ? kRough * scale : 0) + rounding + 8 * (second_order + stops_leave(scene, walk)) + friction_leaves(scene, walk);
+  const double allowed = (scene.rough ? kRough * scale : 0) + rounding + 8 * (second_order + stops_leave(scene, walk)) + friction_leaves(scene, walk) + motion_leaves(walk);
 
   const double first = walk.nodes[0].balance();
   // a blow may be booked a step or two after it: what stays counts

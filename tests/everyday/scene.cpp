@@ -232,7 +232,34 @@ class Maker {
     if (wants(0.08, kind_ == push)) make_pushes();
     if (wants(0.08, kind_ == torque)) make_torques();
     if (wants(0.08, kind_ == drag)) make_drag();
+    if (scene_.number % 5 == 2) make_motion();
     if (on_ground()) make_ground();
+  }
+
+  /// A joint is moved: held, to and fro, or on its way now and then. Numbers of its own, so that all else is as it would be without.
+  void make_motion() {
+    std::vector<std::pair<Index, Index>> screws;
+    each_screw([&](Index slot, Index row) { screws.push_back({slot, row}); });
+    if (screws.empty() || model().degrees_of_freedom() < 2) return;
+    Random random(scene_.seed * 104729 + scene_.number);
+    const auto [slot, row] = screws[random.below(screws.size())];
+    double& q = scene_.start.positions[static_cast<std::size_t>(model().tree.first_q(slot))];
+    double& v = scene_.start.velocities[static_cast<std::size_t>(row)];
+    Course course{{0}, {q}};
+    const double kind = random.uniform(0, 1), apart = h_ * 2 * std::pow(10.0, random.uniform(0, 1));
+    const double w = random.uniform(0.02, 0.3) / apart, size = random.uniform(0.2, 1) * std::min(slides(slot) ? 0.1 : 0.8, (slides(slot) ? 0.5 : 3.0) / w);
+    const double phase = random.uniform(0, 2 * std::numbers::pi);
+    for (int k = 1; kind > 0.2 && k < 400; ++k) {
+      course.times.push_back(k * apart);
+      const bool stands = kind > 0.6 && k / 25 % 2 == 0;
+      course.values.push_back(stands ? course.values.back() : course.values.back() + size * (std::sin(w * k * apart + phase) - std::sin(w * (k - 1) * apart + phase)));
+    }
+    scene_.effects.motions.push_back({row, course});
+    v = reference::PlainCurve(course).derivative(1, 0);
+    const auto of_it = [row = row](const auto& entry) { return entry.row == row; };
+    std::erase_if(scene_.effects.friction, of_it);
+    std::erase_if(scene_.effects.limits, of_it);
+    scene_.bends = true;
   }
 
   void make_servos() {
@@ -435,6 +462,7 @@ std::string EverydayScene::text() const {
   name(!effects.limits.empty(), "limits");
   name(!effects.wrenches.empty(), "wrenches");
   name(!effects.torques.empty(), "torques");
+  name(!effects.motions.empty(), "motion");
   name(!effects.drag.empty(), "drag");
   name(effects.ground.has_value(), rough ? "rough ground" : "ground");
   const bool floats = model->tree.shape.slots > 1 && model->tree.kind(1) == JointKind::free;

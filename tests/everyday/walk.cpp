@@ -78,8 +78,8 @@ Walk walk(const EverydayScene& scene, std::int64_t steps) {
 
 PlainScene plain_of(const EverydayScene& scene, const VectorXd& q, const VectorXd& v, double time) {
   PlainScene plain(*scene.model, scene.effects, scene.options.gravity);
-  plain.start(q, v);
   plain.time = time;
+  plain.start(q, v);
   return plain;
 }
 

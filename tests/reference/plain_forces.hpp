@@ -66,6 +66,7 @@ class PlainForces {
   PlainForces(const PlainTree& tree, const Effects& effects, const std::array<double, 3>& gravity)
       : tree_(&tree), effects_(&effects), gravity_(vector_of(gravity)), position_(position_rows(tree)) {}
 
+  Index position_row(Index row) const { return position_[static_cast<std::size_t>(row)]; }
   double position(const VectorXd& q, Index row) const { return q[position_[static_cast<std::size_t>(row)]]; }
 
   /// limited: servos of limited force as well, as numbers.

@@ -2,8 +2,9 @@
 // A plain simulator of whole scenes: minimal coordinates, dense matrices, tiny steps. The judge of the engine, which shares nothing with
 // it but the model and the values of the effects.
 //
-//   coordinates  u of those rows that follow no other, v = Z u               q' = rates of quaternions and places
-//   smooth       Z^T M Z u' = Z^T (Q - bias)                                  Runge and Kutta's method of order 4
+//   coordinates  u of those rows that follow no other, v = Z u + G w         q' = rates of quaternions and places
+//                w of joints whose motion is given
+//   smooth       Z^T M Z u' = Z^T (Q - bias - M G w')                               Runge and Kutta's method of order 4
 //   sudden       A (u+ - u) = dt Z^T (Q - bias - dt K v) + W^T lambda         A = Z^T (M + dt C + dt^2 K) Z, first order
 //                rows of plain_forces.hpp, D = W A^-1 W^T dense, by projected Gauss and Seidel
 //
@@ -17,6 +18,7 @@
 
 #include <memory>
 
+#include "tests/reference/plain_curve.hpp"
 #include "tests/reference/plain_forces.hpp"
 
 namespace linden::reference {
@@ -38,6 +40,10 @@ class PlainScene {
   void start(const VectorXd& positions, const VectorXd& velocities) {
     q = positions;
     v = velocities;
+    for (const auto& [row, curve] : fixed_->moved) {
+      q[static_cast<Eigen::Index>(fixed_->forces.position_row(row))] = curve.derivative(0, time);
+      v[row] = curve.derivative(1, time);
+    }
     for (const Mimic& mimic : fixed_->mimics) {
       q[mimic.follower_q] = mimic.multiplier * q[mimic.leader_q] + mimic.offset;
       v[mimic.follower_v] = mimic.multiplier * v[mimic.leader_v];
@@ -67,6 +73,7 @@ class PlainScene {
   VectorXd acceleration() const { return acceleration_at(q, v, time, {time, time}); }
 
   /// What each row's velocity weighs where all others are free to move [kg m^2, kg].
+  /// Infinite where the motion is given.
   VectorXd row_inertia() const {
     const MatrixXd M = fixed_->Z.transpose() * mass_matrix() * fixed_->Z;
     return (fixed_->Z * M.ldlt().solve(fixed_->Z.transpose())).diagonal().cwiseInverse();
@@ -115,13 +122,22 @@ class PlainScene {
         : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g) {
       std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.velocities), nullptr);
       for (const Mimic& mimic : mimics) follows[static_cast<std::size_t>(mimic.follower_v)] = &mimic;
-      Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom());
+      Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom() - static_cast<Index>(effects.motions.size()));
+      const auto bends = [&](const Course& course) { breaks.insert(breaks.end(), course.times.begin(), course.times.end()); };
+      G = MatrixXd::Zero(tree.velocities, static_cast<Eigen::Index>(effects.motions.size()));
+      for (const JointMotion& motion : effects.motions) {
+        G(motion.row, static_cast<Eigen::Index>(moved.size())) = 1;
+        moved.push_back({motion.row, PlainCurve(motion.position)});
+        bends(motion.position);
+      }
       Index column = 0;
       for (Index row = 0; row < tree.velocities; ++row) {
-        if (follows[static_cast<std::size_t>(row)] == nullptr) Z(row, column++) = 1;
+        if (follows[static_cast<std::size_t>(row)] == nullptr && G.row(row).isZero()) Z(row, column++) = 1;
       }
-      for (const Mimic& mimic : mimics) Z.row(mimic.follower_v) = mimic.multiplier * Z.row(mimic.leader_v);
-      const auto bends = [&](const Course& course) { breaks.insert(breaks.end(), course.times.begin(), course.times.end()); };
+      for (const Mimic& mimic : mimics) {
+        Z.row(mimic.follower_v) = mimic.multiplier * Z.row(mimic.leader_v);
+        G.row(mimic.follower_v) = mimic.multiplier * G.row(mimic.leader_v);
+      }
       for (const JointTorque& torque : effects.torques) bends(torque.force);
       for (const Servo& servo : effects.servos) {
         for (const Course* course : {&servo.target_over_time, &servo.target_velocity, &servo.feedforward}) bends(*course);
@@ -140,7 +156,8 @@ class PlainScene {
     std::vector<Mimic> mimics;
     Vector3d gravity;
     PlainForces forces;
-    MatrixXd Z;  // [nv x u]
+    MatrixXd Z, G;  // [nv x u], [nv x w]
+    std::vector<std::pair<Index, PlainCurve>> moved;  // by row
     std::vector<double> breaks;  // times at which a force jumps or bends [s]
   };
 
@@ -161,9 +178,16 @@ class PlainScene {
 
   VectorXd acceleration_at(const VectorXd& at, const VectorXd& rate, double t, const Within& within) const {
     const std::vector<BodyMotion> motions = body_motions(tree(), at, rate);
-    const MatrixXd M = fixed_->Z.transpose() * mass_matrix_at(motions) * fixed_->Z;
-    const VectorXd force = fixed_->forces.force(at, rate, within(t), motions, true) - bias_force(tree(), motions);
-    return fixed_->Z * M.ldlt().solve(fixed_->Z.transpose() * force);
+    const MatrixXd M = mass_matrix_at(motions), & Z = fixed_->Z;
+    const VectorXd given = fixed_->G * given_derivatives(2, within(t));
+    const VectorXd force = fixed_->forces.force(at, rate, within(t), motions, true) - bias_force(tree(), motions) - M * given;
+    return given + Z * (Z.transpose() * M * Z).ldlt().solve(Z.transpose() * force);
+  }
+
+  VectorXd given_derivatives(int order, double t) const {
+    VectorXd all(fixed_->G.cols());
+    for (std::size_t k = 0; k < fixed_->moved.size(); ++k) all[static_cast<Eigen::Index>(k)] = fixed_->moved[k].second.derivative(order, t);
+    return all;
   }
 
   /// q' [nq].
@@ -215,12 +239,12 @@ class PlainScene {
         return;
       }
     }
-    sudden_step(within(t + 0.5 * dt), dt);
+    sudden_step(t, within(t + 0.5 * dt), dt);
   }
 
   /// Velocities of free joints are those of the frame where the step begins, and seen from that where it ends only afterwards: what
   /// touches the ground is held in one and the same frame all along.
-  void sudden_step(double t, double dt) {
+  void sudden_step(double begin, double t, double dt) {
     const MatrixXd& Z = fixed_->Z;
     const std::vector<BodyMotion> motions = body_motions(tree(), q, v, true);
     VectorXd c, k;
@@ -229,7 +253,13 @@ class PlainScene {
     M.diagonal() += dt * c + dt * dt * k;
     const Eigen::LLT<MatrixXd> A(Z.transpose() * M * Z);
     const VectorXd force = fixed_->forces.force(q, v, t, motions, false) - bias_force(tree(), motions) - dt * k.cwiseProduct(v);
-    VectorXd after = v + Z * A.solve(dt * (Z.transpose() * force));
+    VectorXd given = VectorXd::Zero(fixed_->G.cols());  // changes of velocity
+    for (std::size_t j = 0; j < fixed_->moved.size(); ++j) {
+      const auto& [row, curve] = fixed_->moved[j];
+      given[static_cast<Eigen::Index>(j)] = (curve.derivative(0, begin + dt) - fixed_->forces.position(q, row)) / dt - v[row];
+    }
+    const VectorXd taken_along = fixed_->G * given;
+    VectorXd after = v + taken_along + Z * A.solve(Z.transpose() * (dt * force - M * taken_along));
     const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, t, dt);
     if (!rows.empty()) {
       MatrixXd W(static_cast<Eigen::Index>(rows.size()), tree().velocities);
