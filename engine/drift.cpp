@@ -23,6 +23,11 @@ double relative(double drift, double scale) { return drift == 0 ? 0 : drift / sc
 
 }  // namespace
 
+std::int64_t energy_stride(std::int64_t steps) {
+  constexpr std::int64_t kSamples = 20'000;
+  return std::max<std::int64_t>(1, (steps + kSamples - 1) / kSamples);
+}
+
 void LineFit::add(double x, double y) {
   points_ += 1;
   const double dx = x - mean_x_, dy = y - mean_y_, n = static_cast<double>(points_);

@@ -20,6 +20,10 @@
 
 namespace linden {
 
+/// Steps from one sample of the energy to the next in a run of so many: every step of one that is no longer than 20,000. Whoever tells an energy
+/// band looks as often, since one that is looked at seldom is narrower.
+std::int64_t energy_stride(std::int64_t steps);
+
 /// Least squares through (x, y), one point after another.
 class LineFit {
  public:

@@ -46,6 +46,9 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+/// What is looked at in a run: the clock alone; places; or energies as well, as often as a run looks at them.
+enum class Watch { time, places, energy };
+
 /// A run of whole samples, `every` seconds apart.
 struct Motion {
   std::vector<std::vector<double>> positions;  // of the samples that were to be kept, from time 0 on
@@ -88,6 +91,7 @@ class Measurement {
   }
 
  private:
+  static bool none(std::int64_t) { return false; }
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
 
   bool going(double until) {
@@ -100,10 +104,11 @@ class Measurement {
   /// The duration, cut where the least that is worth doing would not fit the budget.
   void fit_duration() {
     const double h = setup_.options.step;
-    // sub-steps of the reference, and of all methods down to the step of the options, in units of the duration over that step
-    constexpr double reference = 17, rows = 2 * 39;
+    // sub-steps of the reference, and of all methods down to the step of the options, in units of the duration over that step; each once to
+    // look at and once or more to time
+    constexpr double reference = 17, rows = 3.5 * 39;
     const Motion pilot =
-        run(kOrder2, h, setup_.options.tolerance, 0.02 * setup_.budget, 8, [](std::int64_t) { return false; });
+        run(kOrder2, h, setup_.options.tolerance, 0.02 * setup_.budget, 8, Watch::time, none);
     // where not one step was taken in the time for it, the least there is
     const double fits = pilot.steps > 0 ? 0.7 * setup_.budget * h * static_cast<double>(pilot.steps) / (pilot.seconds * (reference + rows)) : 0;
     const double duration = std::min(setup_.duration, fits);
@@ -111,23 +116,29 @@ class Measurement {
   }
 
   template <class Keep>
-  Motion run(const AccuracyMethod& method, double step, double tolerance, double until, std::int64_t count, const Keep& keep) {
+  Motion run(const AccuracyMethod& method, double step, double tolerance, double until, std::int64_t count, Watch watch, const Keep& keep) {
     Motion motion;
     const std::unique_ptr<Mover> mover = mover_of(setup_, method, step, tolerance);
     const auto chunk = std::llround(every_ / step);
-    motion.energy = EnergyDrift(count + 1);
+    const std::int64_t stride = watch == Watch::energy ? std::min<std::int64_t>(energy_stride(count * chunk), chunk) : chunk;
+    motion.energy = EnergyDrift(count * chunk / stride + 1);
     const auto look = [&] {
+      if (watch == Watch::time) return;
       const Energy energy = mover->energy();
+      const double time = static_cast<double>(motion.steps) * step;
       // what effects took is still part of the account; who does not count it has none
       const Energy account{energy.kinetic, energy.potential + (reversible_ ? 0 : mover->gone())};
-      motion.energy.add(static_cast<double>(motion.samples) * every_, account);
-      if (motion.momentum) motion.momentum->add(static_cast<double>(motion.samples) * every_, *mover->momentum(), energy);
+      motion.energy.add(time, account);
+      if (motion.momentum) motion.momentum->add(time, *mover->momentum(), energy);
+    };
+    const auto keep_place = [&] {
       if (keep(motion.samples)) motion.positions.emplace_back(mover->positions().begin(), mover->positions().end());
     };
     if (const auto first = mover->momentum(); first && !act_from_outside(setup_.effects)) {
       motion.momentum = MomentumDrift::of(*setup_.model, setup_.options.gravity, 0, mover->positions(), *first);
     }
     look();
+    keep_place();
     while (motion.samples < count) {
       if (!going(until)) {
         motion.stopped = true;
@@ -135,9 +146,10 @@ class Measurement {
       }
       const double begin = cpu_seconds();
       bool fine = true;
-      for (std::int64_t k = 0; k < chunk && fine; ++k) {
+      for (std::int64_t k = 1; k <= chunk && fine; ++k) {
         fine = mover->step();
         motion.steps += fine ? 1 : 0;
+        if (fine && (k % stride == 0 || k == chunk)) look();
       }
       motion.seconds += cpu_seconds() - begin;
       if (!fine) {
@@ -145,7 +157,7 @@ class Measurement {
         break;
       }
       motion.samples += 1;
-      look();
+      keep_place();
     }
     motion.evaluations = mover->evaluations();
     motion.split_steps = mover->split_steps();
@@ -207,9 +219,9 @@ class Measurement {
 
   Motion reference_run(const AccuracyMethod& method, double step, double until) {
     const auto all = [](std::int64_t) { return true; };
-    Motion motion = run(method, step, kReferenceTolerance, until, samples(), all);
+    Motion motion = run(method, step, kReferenceTolerance, until, samples(), Watch::places, all);
     if (method != kOrder2 || motion.stopped || !motion.failure.empty()) return motion;
-    Motion coarse = run(method, 2 * step, kReferenceTolerance, until, samples(), all);
+    Motion coarse = run(method, 2 * step, kReferenceTolerance, until, samples(), Watch::places, all);
     if (coarse.stopped || !coarse.failure.empty()) return coarse;
     return extrapolated(std::move(motion), coarse);
   }
@@ -286,7 +298,7 @@ class Measurement {
     for (double h = std::min(setup_.options.step, every_); h > 0.99 * kSmallestAlone * setup_.options.step; h /= 2) {
       const double begin = elapsed();
       if (before && begin + 2.2 * taken > until) break;
-      Motion motion = run(kOrder2, h, kAloneTolerance, until, samples(), [](std::int64_t) { return true; });
+      Motion motion = run(kOrder2, h, kAloneTolerance, until, samples(), Watch::places, [](std::int64_t) { return true; });
       taken = elapsed() - begin;
       if (motion.stopped) break;
       if (!motion.failure.empty()) continue;
@@ -330,7 +342,7 @@ class Measurement {
     result.step = step;
     result.tolerance = shown(method, tolerance);
     const auto keep = [&](std::int64_t sample) { return sample == judged_; };
-    const Motion motion = run(method, step, tolerance, setup_.budget, samples(), keep);
+    const Motion motion = run(method, step, tolerance, setup_.budget, samples(), Watch::energy, keep);
     result.left_out = motion.stopped;
     result.failure = motion.failure;
     result.error = motion.positions.empty() ? kUnknown : std::max(figures_.reference.gap, gap(motion.positions[0], truth_));
@@ -339,14 +351,15 @@ class Measurement {
     result.slope = motion.energy.slope() / scale;
     result.slope_error = motion.energy.slope_error() / scale;
     result.momentum = motion.momentum ? std::max(motion.momentum->linear(), motion.momentum->angular()) : kUnknown;
-    result.seconds = motion.seconds;
     result.steps = motion.steps;
     result.evaluations = motion.evaluations;
     result.split_steps = motion.split_steps;
+    result.seconds = motion.seconds;
     if (!result.done()) return result;
-    for (int again = 0; again < 2 && motion.seconds < kShort && going(setup_.budget); ++again) {
-      const Motion repeated = run(method, step, tolerance, setup_.budget, samples(), keep);
-      if (!repeated.stopped) result.seconds = std::min(result.seconds, repeated.seconds);
+    for (int k = 0; k == 0 || (k < 3 && result.seconds < kShort && going(setup_.budget)); ++k) {
+      const Motion timed = run(method, step, tolerance, setup_.budget, samples(), Watch::time, none);
+      if (!timed.stopped) result.seconds = k == 0 ? timed.seconds : std::min(result.seconds, timed.seconds);
+      result.left_out = result.left_out || (k == 0 && timed.stopped);
     }
     return result;
   }

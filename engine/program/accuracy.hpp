@@ -16,9 +16,9 @@
 //              the step, and judged to kJudgedAlone.
 //   error      largest difference of a coordinate to the reference [rad, m]; of a quaternion twice its components', an angle.
 //              Never less than what the two references leave open.
-//   energy     band max H - min H and slope of H, sampled every largest step, relative to the largest kinetic energy of the
+//   energy     band max H - min H and slope of H, sampled as a run is (energy_stride), relative to the largest kinetic energy of the
 //              reference; with effects that take or give energy of H + taken - given, where a method keeps that account
-//   time       CPU time of the steps alone, of this thread
+//   time       CPU time of the steps alone, of this thread: of a run of its own in which nothing is looked at
 //   budget     the clock's seconds for everything. Rows go from large steps to small; what no longer fits is left out and said
 //              so. Where not even a reference would fit the duration is cut.
 #pragma once

@@ -13,6 +13,7 @@ namespace linden {
 namespace {
 
 constexpr double kTargets[] = {1e-3, 1e-6, 1e-9};
+constexpr double kWhole = 0.9;  // of the duration asked for
 
 std::string milliseconds(double seconds) { return fmt::format("{:.4g}", 1e3 * seconds); }
 
@@ -42,8 +43,20 @@ std::string advice_for(const AccuracyFigures& figures, double AccuracyRow::*valu
   if (ours == nullptr) {
     return theirs == nullptr ? "" : fmt::format("{} no step that was tried suffices ({} would do)", goal, step_text(*theirs));
   }
-  const std::string rival = theirs == nullptr ? "" : fmt::format("; {}: {}", step_text(*theirs), minute_text(*theirs, figures));
-  return fmt::format("{} use {} ({} of CPU per simulated minute{})", goal, step_text(*ours), minute_text(*ours, figures), rival);
+  const auto timed = [&](const AccuracyRow& row) { return fmt::format("{}: {}", step_text(row), minute_text(row, figures)); };
+  if (theirs != nullptr && theirs->seconds < ours->seconds) {
+    return fmt::format("{} RK4 costs least ({} of CPU per simulated minute); of linden's own {}", goal, timed(*theirs), timed(*ours));
+  }
+  return fmt::format("{} use {} ({} of CPU per simulated minute{})", goal, step_text(*ours), minute_text(*ours, figures),
+                     theirs == nullptr ? "" : "; " + timed(*theirs));
+}
+
+/// What advice from a shorter time than was asked for is worth; empty where it is none.
+std::string worth_of(const AccuracyFigures& figures) {
+  if (!(figures.duration < kWhole * figures.asked)) return "";
+  return fmt::format("from {:.3g} s of the {:.6g} s that were asked for: what grows with time, or happens later, is not in it; a larger --budget "
+                     "goes on for longer",
+                     figures.duration, figures.asked);
 }
 
 std::string note(const AccuracyRow& row) {
@@ -90,6 +103,8 @@ std::vector<std::string> accuracy_advice(const AccuracyFigures& figures) {
   }
   for (const double target : kTargets) lines.push_back(advice_for(figures, &AccuracyRow::band, target, "an energy band"));
   std::erase(lines, "");
+  if (!lines.empty()) lines.push_back(worth_of(figures));
+  std::erase(lines, "");
   return lines;
 }
 
@@ -99,7 +114,7 @@ std::string accuracy_summary(const AccuracyArguments& arguments, const AccuracyS
   row("model", model_text(arguments, *setup.model));
   row("start", start_text(arguments));
   row("run", fmt::format("{:.6g} s{}, {}", figures.duration,
-                         figures.duration < 0.9 * figures.asked
+                         figures.duration < kWhole * figures.asked
                              ? fmt::format(" instead of {:.6g} s, for the budget of {:g} s", figures.asked, setup.budget)
                              : "",
                          gravity_text(setup.options)));

@@ -26,8 +26,6 @@ namespace {
 
 using Clock = Progress::Clock;
 
-constexpr std::int64_t kSamples = 20'000;
-
 /// Whether the file holds something that is no checkpoint: a slip of the hand should not cost anyone a file.
 bool holds_something_else(const std::string& file) {
   constexpr std::string_view kBegins = "linden checkpoint";
@@ -68,7 +66,7 @@ class Execution {
  public:
   Execution(const RunArguments& arguments, Simulation& simulation, std::int64_t steps) : arguments_(arguments), simulation_(simulation) {
     figures_.steps_planned = steps;
-    figures_.sampled_every = arguments.record.empty() ? (steps + kSamples - 1) / kSamples : 1;
+    figures_.sampled_every = arguments.record.empty() ? energy_stride(steps) : 1;
     figures_.begin = simulation.time();
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
     if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
