@@ -13,7 +13,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <system_error>
 
 #include "engine/files/output_file.hpp"
 #include "engine/simulation.hpp"
@@ -84,6 +86,11 @@ void Simulation::save(const std::string& file) {
 }
 
 void Simulation::load(const std::string& file) {
+  std::error_code ignored;
+  const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {  // opening a pipe waits for who writes to it
+    throw InputError(fmt::format("{}: this is not an ordinary file; expected a checkpoint that linden saved", file));
+  }
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: the checkpoint cannot be read; does the file exist?", file));
   std::string bytes;

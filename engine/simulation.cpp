@@ -10,6 +10,7 @@
 #include "engine/scene/scene.hpp"
 #include "engine/step/composition.hpp"
 #include "engine/step/instance_stepper.hpp"
+#include "engine/threads.hpp"
 #include "kernels/mimic.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
@@ -31,6 +32,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
     : model_(required(std::move(model))), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
       stepper_(make_stepper(*model_, options, *plan_)) {
+  if (model_->tree.most_threads() > 1) require_threads(threads_here());
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());

@@ -1,14 +1,13 @@
 #include "engine/files/recorder.hpp"
 
 #include <iterator>
+#include <stdexcept>
 #include <string_view>
 #include <unordered_set>
 #include <utility>
 
 namespace linden {
 namespace {
-
-constexpr std::size_t kWriteAtOnce = 1 << 16;  // bytes
 
 std::string csv_cell(const std::string& name) {
   if (name.find_first_of(",\"\r\n") == name.npos) return name;
@@ -38,24 +37,25 @@ Recorder::Recorder(const std::string& file, const Names& names) : out_(file) {
     fmt::format_to(std::back_inserter(text_), "{}{}", std::exchange(gap, ","), csv_cell(column));
   }
   text_.push_back('\n');
+  out_.write({text_.data(), text_.size()});
 }
 
 void Recorder::add(double time, double energy, std::span<const double> positions) {
+  text_.clear();
   fmt::format_to(std::back_inserter(text_), "{:.17g},{:.17g}", time, energy);
   for (const double position : positions) fmt::format_to(std::back_inserter(text_), ",{:.17g}", position);
   text_.push_back('\n');
-  rows_ += 1;
-  if (text_.size() >= kWriteAtOnce) flush();
-}
-
-void Recorder::flush() {
   out_.write({text_.data(), text_.size()});
-  text_.clear();
 }
 
 void Recorder::commit() {
-  flush();
-  out_.commit();
+  try {
+    out_.commit();
+  } catch (const std::runtime_error&) {
+    out_.settle();
+    if (rows() > 0) out_.commit();
+    throw;
+  }
 }
 
 }  // namespace linden

@@ -25,18 +25,17 @@ class Recorder {
   /// Writes the header. Throws std::runtime_error, as do add and commit, where the file cannot be written.
   Recorder(const std::string& file, const Names& names);
 
+  /// Where that fails the rows before stay, whole, and nothing can be added.
   void add(double time, double energy, std::span<const double> positions);
-  /// Until then there is no file of that name.
+  /// Until then there is no file of that name. Where the last rows do not fit the others are put in place before it throws.
   void commit();
 
-  std::int64_t rows() const { return rows_; }
+  /// That are kept.
+  std::int64_t rows() const { return out_.records() - 1; }
 
  private:
-  void flush();
-
   OutputFile out_;
   fmt::memory_buffer text_;
-  std::int64_t rows_ = 0;
 };
 
 }  // namespace linden

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
 #include <iterator>
 #include <stdexcept>
@@ -36,24 +37,19 @@ void require_length(std::string_view what, std::size_t found, std::int64_t expec
 template <class Real>
 struct RolloutFile<Real>::Data {
   std::string file;
-  std::int64_t instances, nq, nv, frames = 0;
-  std::unique_ptr<ArrayFile> arrays;  // none when all is done or something failed
+  std::int64_t instances, nq, nv;
+  std::unique_ptr<ArrayFile> arrays;  // none when all is done
+  bool failed = false;
+  std::int64_t frames = 0;  // that were committed
 
-  template <class Work>
-  void write(Work work) {
-    if (!arrays) cannot_be_written(file, "it is committed or has failed before");
-    try {
-      work(*arrays);
-    } catch (...) {
-      arrays.reset();
-      throw;
-    }
+  void require_open() const {
+    if (!arrays || failed) cannot_be_written(file, "it is committed or has failed before");
   }
 };
 
 template <class Real>
 RolloutFile<Real>::RolloutFile(const std::string& file, const Names& names, std::int64_t instances)
-    : data_(new Data{file, instances, std::ssize(names.position), std::ssize(names.velocity), 0, array_file(file)}) {
+    : data_(new Data{file, instances, std::ssize(names.position), std::ssize(names.velocity), array_file(file)}) {
   constexpr ElementType kReal = std::is_same_v<Real, float> ? ElementType::float32 : ElementType::float64;
   ArrayFile& arrays = *data_->arrays;
   arrays.add_numbers("time", ElementType::float64, {});
@@ -76,25 +72,24 @@ void RolloutFile<Real>::add(double time, std::span<const Real> q, std::span<cons
   require_length("v", v.size(), data_->instances * data_->nv);
   require_length("energy", energy.size(), data_->instances);
   require_length("status", status.size(), data_->instances);
-  data_->write([&](ArrayFile& arrays) {
-    std::size_t array = 0;  // in the order in which they were added
-    for (const void* row : {static_cast<const void*>(&time), static_cast<const void*>(q.data()), static_cast<const void*>(v.data()),
-                            static_cast<const void*>(energy.data()), static_cast<const void*>(status.data())}) {
-      arrays.append(array++, row);
-    }
-  });
-  data_->frames += 1;
+  data_->require_open();
+  data_->failed = true;
+  data_->arrays->append(std::array<const void*, 5>{&time, q.data(), v.data(), energy.data(), status.data()});
+  data_->failed = false;
 }
 
 template <class Real>
 void RolloutFile<Real>::commit() {
-  data_->write([](ArrayFile& arrays) { arrays.commit(); });
-  data_->arrays.reset();
+  if (!data_->arrays) data_->require_open();
+  const std::unique_ptr<ArrayFile> arrays = std::move(data_->arrays);
+  data_->frames = arrays->rows();
+  if (data_->failed && data_->frames == 0) cannot_be_written(data_->file, "the disk has no room for one frame");
+  arrays->commit();
 }
 
 template <class Real>
 std::int64_t RolloutFile<Real>::frames() const {
-  return data_->frames;
+  return data_->arrays ? data_->arrays->rows() : data_->frames;
 }
 
 template class RolloutFile<double>;

@@ -27,8 +27,8 @@ namespace linden {
 template <class Real>
 class RolloutFile {
  public:
-  /// FILE.npz or FILE.h5. Throws std::runtime_error, as add and commit do: `FILE: cannot be written: reason`. After that nothing is left
-  /// in the folder, and add and commit throw again.
+  /// FILE.npz or FILE.h5. Throws std::runtime_error, as add and commit do: `FILE: cannot be written: reason`. After that add throws again,
+  /// and commit puts the frames before in place; nothing else is left in the folder.
   RolloutFile(const std::string& file, const Names& names, std::int64_t instances);
   /// What was not committed is deleted.
   ~RolloutFile();
@@ -38,8 +38,10 @@ class RolloutFile {
   /// One frame: q [N][nq], v [N][nv], energy [N], status [N], instance by instance. Throws std::invalid_argument for other lengths.
   void add(double time, std::span<const Real> q, std::span<const Real> v, std::span<const Real> energy,
            std::span<const std::uint8_t> status);
+  /// Throws where there is no frame because the first one did not fit.
   void commit();
 
+  /// That are kept.
   std::int64_t frames() const;
 
  private:

@@ -1,7 +1,7 @@
 // engine/program/main.cpp
 // The program `linden`: commands, their options, and what becomes of mistakes.
 //
-//   exit codes  0 fine, 1 the run failed, 2 bad input, 130 interrupted
+//   exit codes  0 fine, 1 the run failed or an output was lost, 2 bad input, 128 + signal interrupted
 //   messages    one line on stderr that begins with "linden: "; results on stdout
 #include <fmt/format.h>
 
@@ -14,6 +14,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <type_traits>
 #include <vector>
 
@@ -24,6 +25,7 @@
 #include "engine/program/scaling_command.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_file.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
 #include "layout/words.hpp"
@@ -206,8 +208,8 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");
   add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
   command->footer(
-      "Coordinates are named after their joints, a name that is taken with _2 behind it; quaternions are x y z w. Ctrl-C ends a run early\n"
-      "and keeps its files.\n"
+      "Coordinates are named after their joints, a name that is taken with _2 behind it; quaternions are x y z w. Ctrl-C, SIGTERM and\n"
+      "SIGHUP end a run early and keep its files; on a full disk it ends with what fits.\n"
       "What is given here goes over what a scene says.\n\n"
       "Examples:\n"
       "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"
@@ -236,8 +238,8 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
   add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
   command->footer(
-      "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C ends a rollout early\n"
-      "and keeps its files.\n\n"
+      "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C, SIGTERM and SIGHUP end\n"
+      "a rollout early and keep its files; on a full disk it ends with what fits.\n\n"
       "Examples:\n"
       "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
       "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"
@@ -363,7 +365,7 @@ int run_program(int argc, char** argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    fmt::print("{}", with_single_gaps(program.help()));
+    say_text(with_single_gaps(program.help()));
     return 0;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
@@ -404,25 +406,37 @@ int run_program(int argc, char** argv) {
   throw InputError("no command given; choose run, rollout, accuracy, scaling or inspect; linden --help says more");
 }
 
+constexpr const char* kNoMemory = "there is not enough memory for that; choose a smaller model or fewer instances, or allow more (ulimit -v)";
+
 int complain(std::string_view message, int exit_code) {
-  fmt::print(stderr, "linden: {}\n", printable(message));
+  tell_text(message);
   return exit_code;
+}
+
+int guarded(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const MemoryError& error) {
+    return complain(error.what(), 1);
+  } catch (const InputError& error) {
+    return complain(error.what(), 2);
+  } catch (const std::bad_alloc&) {
+    return complain(kNoMemory, 1);
+  } catch (const std::length_error&) {
+    return complain(kNoMemory, 1);
+  } catch (const std::exception& error) {
+    return complain(error.what(), 1);
+  }
 }
 
 }  // namespace
 }  // namespace linden
 
 int main(int argc, char** argv) {
-  using linden::complain;
-  try {
-    return linden::run_program(argc, argv);
-  } catch (const linden::InputError& error) {
-    return complain(error.what(), 2);
-  } catch (const std::bad_alloc&) {
-    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
-  } catch (const std::length_error&) {
-    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
-  } catch (const std::exception& error) {
-    return complain(error.what(), 1);
-  }
+  linden::prepare_standard_streams();
+  const int exit_code = linden::guarded(argc, argv);
+  const int lost = linden::flush_standard_output();
+  if (lost == 0) return exit_code;
+  linden::tell("standard output cannot be written: {}", std::generic_category().message(lost));
+  return exit_code != 0 ? exit_code : 1;
 }

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "engine/files/output_file.hpp"
@@ -17,6 +19,7 @@
 #include "engine/program/progress.hpp"
 #include "engine/program/rollout_report.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
 
@@ -71,12 +74,11 @@ class Execution {
     energy_.resize(static_cast<std::size_t>(arguments.instances));
   }
 
-  void steps() {
-    const Interrupt interrupt;
+  void steps(const Interrupt& interrupt) {
     Progress progress(figures_.steps_planned, arguments_.options.step);
     std::int64_t stretch = 1;  // steps between two looks at the clock
     look();
-    while (figures_.steps < figures_.steps_planned && interrupt.signal() == 0) {
+    while (figures_.steps < figures_.steps_planned && figures_.lost.empty() && interrupt.signal() == 0) {
       std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
       if (file_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
       const Clock::time_point begin = Clock::now();
@@ -91,7 +93,7 @@ class Execution {
       progress.update(figures_.steps, now);
     }
     if (looked_at_ != figures_.steps) look();
-    if (figures_.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
+    if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
     finish();
   }
 
@@ -99,10 +101,13 @@ class Execution {
   bool write_files() {
     bool fine = true;
     if (file_) {
-      fine = attempt([&] {
+      const std::string before = figures_.lost;
+      recording([&] {
         file_->commit();
         figures_.frames = file_->frames();
       });
+      if (!before.empty()) figures_.lost = before;
+      fine = figures_.lost.empty();
     }
     if (!arguments_.json.empty()) {
       fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
@@ -113,6 +118,14 @@ class Execution {
   RolloutFigures& figures() { return figures_; }
 
  private:
+  void recording(const std::function<void()>& work) {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      figures_.lost = error.what();
+    }
+  }
+
   /// Energies of all instances, and a frame of the file.
   void look() {
     const auto seen = batch_.observe();
@@ -135,7 +148,9 @@ class Execution {
       std::ranges::copy(velocities.instance(i), v_.begin() + i * velocities.rows());
       status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
     }
-    if (file_) file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, q_, v_, energy_, status_);
+    if (file_ && figures_.lost.empty()) {
+      recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, q_, v_, energy_, status_); });
+    }
     looked_at_ = figures_.steps;
   }
 
@@ -163,20 +178,25 @@ class Execution {
 template <class Real>
 int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
   check_instances<Real>(arguments, model->tree.shape);
+  const Interrupt interrupt;
   Execution<Real> rollout(arguments, model, steps);
-  rollout.steps();
+  rollout.steps(interrupt);
   RolloutFigures& figures = rollout.figures();
   figures.total_seconds = seconds(Clock::now() - begin);
   const bool written = rollout.write_files();
-  fmt::print("{}", rollout_summary(arguments, *model, figures));
-  std::fflush(stdout);
+  say_text(rollout_summary(arguments, *model, figures));
   if (figures.signal != 0) {
-    fmt::print(stderr, "linden: interrupted after {} of {} steps{}\n", grouped(figures.steps), grouped(figures.steps_planned),
-               figures.frames > 0 ? printable(fmt::format("; {} is valid up to there", arguments.record)) : "");
+    tell("interrupted after {} of {} steps{}", grouped(figures.steps), grouped(figures.steps_planned),
+               figures.frames > 0 ? fmt::format("; {} is valid up to there", arguments.record) : "");
     return 128 + figures.signal;
   }
+  if (!figures.lost.empty()) {
+    tell("{}; {}; the rollout ended after {} of {} steps", figures.lost,
+         figures.frames > 0 ? fmt::format("it holds {}", counted(figures.frames, "frame")) : "no frame of it is kept", grouped(figures.steps),
+         grouped(figures.steps_planned));
+  }
   if (figures.summary.frozen > 0) {
-    fmt::print(stderr, "linden: {} of {} instances failed and were frozen at their last good state\n", grouped(figures.summary.frozen),
+    tell("{} of {} instances failed and were frozen at their last good state", grouped(figures.summary.frozen),
                grouped(arguments.instances));
   }
   return written && figures.summary.frozen == 0 ? 0 : 1;

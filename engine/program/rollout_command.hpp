@@ -4,7 +4,8 @@
 //   start     instance i starts from random_state(seed + i, spread)
 //   steps     all instances, in stretches of some tenths of a second between which progress is shown and an interrupt heard
 //   fails     an instance whose step fails is frozen at its last good state; the others go on, and the exit code is 1
-//   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step.
+//   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step; where the recording
+//             finds no room it ends with the frames that did
 #pragma once
 
 #include <cstdint>
@@ -23,8 +24,8 @@ struct RolloutArguments : MotionArguments {
   std::string record, json;  // files; empty = none
 };
 
-/// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 130 after Ctrl-C. Throws InputError for bad
-/// input.
+/// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 128 + signal after one. Throws InputError
+/// for bad input.
 int rollout_command(const RolloutArguments& arguments);
 
 }  // namespace linden

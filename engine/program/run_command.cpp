@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string_view>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "engine/program/progress.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 
 namespace linden {
@@ -75,12 +77,11 @@ class Execution {
     if (!arguments.record.empty()) recorder_.emplace(arguments.record, simulation.model().names);
   }
 
-  void steps() {
-    const Interrupt interrupt;
+  void steps(const Interrupt& interrupt) {
     Progress progress(figures_.steps_planned, simulation_.options().step);
     std::int64_t chunk = 1;  // steps between two looks at the clock
     sample();
-    while (figures_.run.steps < figures_.steps_planned && figures_.failure.empty() && interrupt.signal() == 0) {
+    while (figures_.run.steps < figures_.steps_planned && figures_.failure.empty() && figures_.lost.empty() && interrupt.signal() == 0) {
       const std::int64_t end = std::min({figures_.steps_planned, figures_.run.steps + chunk, next_sample_});
       const Clock::time_point begin = Clock::now();
       figures_.run.add(simulation_.run(end - figures_.run.steps));
@@ -94,7 +95,7 @@ class Execution {
       progress.update(figures_.run.steps, now);
     }
     if (last_sample_ != figures_.run.steps) sample();
-    if (figures_.run.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
+    if (figures_.run.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
   }
 
   /// Everything that was asked for. Complaints go to stderr; true where there were none.
@@ -108,7 +109,11 @@ class Execution {
         fine = false;
       }
     };
-    write(arguments_.record, [&] { recorder_->commit(); });
+    if (recorder_) {
+      keep_recording();
+      if (figures_.rows > 0) written_.push_back(arguments_.record);
+      fine = figures_.lost.empty();
+    }
     write(arguments_.save, [&] { simulation_.save(arguments_.save); });
     write(arguments_.plot, [&] { plot::draw(arguments_.plot, energy_chart(arguments_, simulation_, figures_)); });
     write(arguments_.json, [&] { write_json(arguments_.json, run_json(arguments_, simulation_, figures_)); });
@@ -119,13 +124,31 @@ class Execution {
   const std::vector<std::string>& written() const { return written_; }
 
  private:
+  void recording(const std::function<void()>& work) {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      figures_.lost = error.what();
+    }
+  }
+
+  /// Rows that were recorded before the disk was full are kept.
+  void keep_recording() {
+    const std::string before = figures_.lost;
+    if (before.empty() || recorder_->rows() > 0) recording([&] { recorder_->commit(); });
+    if (!before.empty() && figures_.lost != before) return;  // they cannot be kept either
+    figures_.rows = recorder_->rows();
+  }
+
   void sample() {
     const Energy energy = simulation_.energy();
     figures_.taken = simulation_.effect_work().taken();
     figures_.given = simulation_.effect_work().given();
     figures_.energy.add(simulation_.time(), energy, figures_.taken, figures_.given);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
-    if (recorder_) recorder_->add(simulation_.time(), energy.total(), simulation_.positions());
+    if (recorder_ && figures_.lost.empty()) {
+      recording([&] { recorder_->add(simulation_.time(), energy.total(), simulation_.positions()); });
+    }
     // what effects took is still in the account, what they gave is not
     if (!arguments_.plot.empty()) trace({simulation_.time(), energy.total() + figures_.taken - figures_.given - figures_.energy.initial()});
     last_sample_ = figures_.run.steps;
@@ -158,6 +181,12 @@ std::string ending(const Execution& run, const RunFigures& figures, const Option
   if (figures.signal != 0) {
     return fmt::format("interrupted at {:.6g} s, after {} of {} steps{}", time, grouped(done), grouped(figures.steps_planned), files);
   }
+  if (figures.failure.empty()) {
+    const std::string kept = figures.rows > 0 ? fmt::format("it holds {}", counted(figures.rows, "row"))
+                                              : "no row of it is kept";
+    return fmt::format("{}; {}; the run ended at {:.6g} s, after {} of {} steps", figures.lost, kept, time, grouped(done),
+                       grouped(figures.steps_planned));
+  }
   return fmt::format("the run failed in step {} of {}: {}; the last good state is that at {:.6g} s{}", grouped(done + 1),
                      grouped(figures.steps_planned), figures.failure, time, files);
 }
@@ -175,15 +204,15 @@ int run_command(const RunArguments& arguments) {
   Simulation simulation(model, arguments.options, arguments.effects());
   begin_run(arguments, simulation);
 
+  const Interrupt interrupt;
   Execution run(arguments, simulation, steps);
-  run.steps();
+  run.steps(interrupt);
   RunFigures& figures = run.figures();
   figures.total_seconds = seconds(Clock::now() - begin);
   const bool written = run.write_files();
-  fmt::print("{}", run_summary(arguments, simulation, figures));
-  std::fflush(stdout);
-  for (const std::string& warning : energy_warnings(simulation, figures.energy)) fmt::print(stderr, "linden: warning: {}\n", printable(warning));
-  if (!figures.complete()) fmt::print(stderr, "linden: {}\n", printable(ending(run, figures, arguments.options)));
+  say_text(run_summary(arguments, simulation, figures));
+  for (const std::string& warning : energy_warnings(simulation, figures.energy)) tell("warning: {}", warning);
+  if (!figures.complete()) tell_text(ending(run, figures, arguments.options));
   return figures.signal != 0 ? 128 + figures.signal : written && figures.complete() ? 0 : 1;
 }
 

@@ -4,7 +4,8 @@
 //   checks    options, outputs, model: all that can be wrong is found before the first step
 //   steps     energy is sampled after every step when recording and in runs of up to 20,000 steps, else about 20,000 times; the time
 //             that sampling and writing take is not counted as time of steps
-//   writes    files appear whole or not at all. A run that fails or is interrupted leaves them valid up to its last good step.
+//   writes    files appear whole or not at all. A run that fails or is interrupted leaves them valid up to its last good step; where the
+//             recording finds no room the run ends with the rows that did
 #pragma once
 
 #include <string>
@@ -18,7 +19,7 @@ struct RunArguments : MotionArguments {
   std::string record, json, plot, save, load;  // files; empty = none
 };
 
-/// Returns the exit code: 0, 1 where a step failed or a file could not be written, 130 after Ctrl-C. Throws InputError for bad input.
+/// Returns the exit code: 0, 1 where a step failed or a file could not be written, 128 + signal after one. Throws InputError for bad input.
 int run_command(const RunArguments& arguments);
 
 }  // namespace linden

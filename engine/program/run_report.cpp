@@ -126,7 +126,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   const auto written = [&](const std::string& file, const std::string& what) {
     if (!file.empty()) row("", printable(fmt::format("{}: {}", file, what)));
   };
-  written(arguments.record, fmt::format("{} rows", grouped(energy.samples())));
+  written(arguments.record, fmt::format("{} rows", grouped(figures.rows)));
   return text;
 }
 
@@ -209,6 +209,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
                                               : Json("P - m g t, and angular momentum along gravity")},
       {"failures", figures.failure.empty() ? 0 : 1},
       {"failure", if_given(figures.failure)},
+      {"recording_failure", if_given(figures.lost)},
       {"interrupted", figures.signal != 0},
       {"advice", if_given(fmt::format("{}", fmt::join(energy_warnings(simulation, energy), "; ")))},
       {"warnings", model.warnings},

@@ -28,8 +28,10 @@ struct RunFigures {
   std::vector<plot::Point> trace;  // drift of that energy [J] over time, for the picture
   std::string failure;             // what Simulation::describe says of the step that failed
   int signal = 0;                  // that ended the run
+  std::int64_t rows = 0;           // of the recording
+  std::string lost;                // why the recording ended early, and the run with it
 
-  bool complete() const { return failure.empty() && signal == 0; }
+  bool complete() const { return failure.empty() && signal == 0 && lost.empty(); }
   double simulated(double step) const { return static_cast<double>(run.steps) * step; }
 };
 
