@@ -89,7 +89,8 @@ class Simulation {
   Momentum momentum();
 
   /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step,
-  /// order or gravity, a file that is cut short or is no checkpoint; the simulation is then unchanged.
+  /// order or gravity, effects on other joints or bodies (their numbers may be others), a file that is cut short or is no checkpoint; the
+  /// simulation is then unchanged.
   void save(const std::string& file);
   void load(const std::string& file);
 
