@@ -205,6 +205,7 @@ void Simulation::load(const std::string& file) {
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);
   effect_work_ = {};
+  if (impulses_) impulses_->clear();
   watch_.emplace(*model_, plan_->effects);
   stepper_->refresh(state_);
 }

@@ -71,7 +71,7 @@ class H5File final : public ArrayFile {
  public:
   explicit H5File(const std::string& file) : folder_(file), disk_(folder_.file(kWhole)), file_(create()) {}
 
-  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) override {
+  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string>) override {
     const std::pair<hid_t, hid_t> types[] = {{H5T_IEEE_F32LE, H5T_NATIVE_FLOAT},
                                              {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE},
                                              {H5T_STD_U8LE, H5T_NATIVE_UINT8}};
@@ -118,11 +118,13 @@ class H5File final : public ArrayFile {
   std::int64_t rows() const override { return rows_; }
 
   void commit() override {
+    const std::int64_t all = std::exchange(rows_, 0);
     for (Array& array : arrays_) finish(array.dataset);
     finish(file_);
     disk_.close();
     require(true);
     folder_.publish(kWhole);
+    rows_ = all;
   }
 
  private:

@@ -67,7 +67,7 @@ class NpzFile final : public ArrayFile {
  public:
   explicit NpzFile(const std::string& file) : folder_(file), held_(folder_.file("room")) {}
 
-  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) override {
+  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string>) override {
     constexpr std::pair<const char*, std::int64_t> kTypes[] = {{"<f4", 4}, {"<f8", 8}, {"|u1", 1}};
     const auto [code, size] = kTypes[static_cast<std::size_t>(type)];
     const std::int64_t bytes = std::accumulate(row.begin(), row.end(), size, std::multiplies<>());
@@ -104,12 +104,14 @@ class NpzFile final : public ArrayFile {
   void commit() override {
     held_.release();
     for (const std::size_t k : numbers_) arrays_[k].rows = rows_;
+    const std::int64_t all = std::exchange(rows_, 0);
     for (Array& array : arrays_) {
       array.out.rewrite(array.header());
       array.out.flush();
     }
     assemble();
     folder_.publish(kWhole);
+    rows_ = all;
   }
 
  private:

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -31,6 +32,8 @@ using Clock = Progress::Clock;
 Outputs checked_outputs(const RolloutArguments& arguments) {
   if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
   if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
+  if (!arguments.what.empty() && arguments.record.empty()) throw InputError("--what says what --record takes: give a --record file too");
+  require_available(arguments.what, {Quantity::positions, Quantity::velocities, Quantity::energies}, "a rollout");
   return {{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
 }
 
@@ -65,11 +68,17 @@ class Execution {
     });
     figures_.bytes = batch_.bytes();
     if (!arguments.record.empty()) {
-      file_.emplace(arguments.record, batch_.model().names, arguments.instances);
-      const auto room = [&](Index rows) { return static_cast<std::size_t>(arguments.instances) * static_cast<std::size_t>(rows); };
-      q_.resize(room(batch_.model().tree.shape.positions));
-      v_.resize(room(batch_.model().tree.shape.velocities));
-      status_.resize(room(1));
+      what_ = arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what;
+      const Names& names = batch_.model().names;
+      std::vector<RecordedArray> arrays;
+      for (const Quantity quantity : what_) {
+        arrays.push_back(quantity == Quantity::positions    ? recorded_positions(names)
+                         : quantity == Quantity::velocities ? recorded_velocities(names)
+                                                            : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
+        numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
+      }
+      status_.resize(static_cast<std::size_t>(arguments.instances));
+      file_.emplace(arguments.record, arguments.instances, std::move(arrays));
     }
     energy_.resize(static_cast<std::size_t>(arguments.instances));
   }
@@ -144,12 +153,15 @@ class Execution {
       if (first) figures_.first_energy[at] = total;
       figures_.most_kinetic[at] = std::max(figures_.most_kinetic[at], kinetic);
       if (!file_) continue;
-      std::ranges::copy(positions.instance(i), q_.begin() + i * positions.rows());
-      std::ranges::copy(velocities.instance(i), v_.begin() + i * velocities.rows());
+      for (std::size_t k = 0; k < what_.size(); ++k) {
+        const auto& from = what_[k] == Quantity::positions ? positions : what_[k] == Quantity::velocities ? velocities : energies;
+        std::ranges::copy(from.instance(i), numbers_[k].begin() + i * from.rows());
+      }
       status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
     }
     if (file_ && figures_.lost.empty()) {
-      recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, q_, v_, energy_, status_); });
+      const std::vector<std::span<const Real>> arrays(numbers_.begin(), numbers_.end());
+      recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, arrays, energy_, status_); });
     }
     looked_at_ = figures_.steps;
   }
@@ -170,7 +182,9 @@ class Execution {
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;
-  std::vector<Real> q_, v_, energy_;
+  std::vector<Quantity> what_;              // that is recorded
+  std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
+  std::vector<Real> energy_;
   std::vector<std::uint8_t> status_;
   std::int64_t looked_at_ = -1;
 };
@@ -210,6 +224,10 @@ int rollout_command(const RolloutArguments& given) {
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   const Outputs outputs = checked_outputs(arguments);
+  if (arguments.options.order != 2) {
+    throw InputError(fmt::format("--order {}: a rollout has order 2 alone; expected 2; give --order 2, or simulate one instance with linden run",
+                                 arguments.options.order));
+  }
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
   const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);

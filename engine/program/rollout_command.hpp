@@ -10,9 +10,11 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "engine/batch.hpp"
 #include "engine/program/motion_arguments.hpp"
+#include "engine/program/quantities.hpp"
 
 namespace linden {
 
@@ -22,6 +24,7 @@ struct RolloutArguments : MotionArguments {
   bool single = false;      // float instead of double
   std::int64_t every = 1;   // steps between recorded frames
   std::string record, json;  // files; empty = none
+  std::vector<Quantity> what;  // to record; empty: what is usual
 };
 
 /// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 128 + signal after one. Throws InputError

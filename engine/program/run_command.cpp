@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "engine/files/output_file.hpp"
-#include "engine/files/recorder.hpp"
 #include "engine/files/report_files.hpp"
+#include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
@@ -41,7 +41,12 @@ bool holds_something_else(const std::string& file) {
 
 /// Every file that is to be written can be.
 Outputs checked_outputs(const RunArguments& arguments) {
-  Outputs outputs{{"--record", arguments.record, {".csv"}},
+  if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between rows", arguments.every));
+  if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
+  if (!arguments.what.empty() && arguments.record.empty() && arguments.plot.empty()) {
+    throw InputError("--what says what --record and --plot take: give one of them too");
+  }
+  Outputs outputs{{"--record", arguments.record, {".csv", ".npz", ".h5"}},
                   {"--json", arguments.json, {".json"}},
                   {"--plot", arguments.plot, {".svg", ".png"}},
                   {"--save", arguments.save, {}}};
@@ -74,7 +79,11 @@ class Execution {
     figures_.begin = simulation.time();
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
     if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
-    if (!arguments.record.empty()) recorder_.emplace(arguments.record, simulation.model().names);
+    if (!arguments.record.empty()) {
+      observer_.emplace(simulation, arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what);
+      file_.emplace(arguments.record, 1, observer_->arrays());
+    }
+    if (!arguments.plot.empty() && !arguments.what.empty()) begin_traces();
   }
 
   void steps(const Interrupt& interrupt) {
@@ -95,6 +104,7 @@ class Execution {
       progress.update(figures_.run.steps, now);
     }
     if (last_sample_ != figures_.run.steps) sample();
+    if (last_record_ != figures_.run.steps) record(simulation_.energy());
     if (figures_.run.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
   }
 
@@ -109,13 +119,13 @@ class Execution {
         fine = false;
       }
     };
-    if (recorder_) {
+    if (file_) {
       keep_recording();
       if (figures_.rows > 0) written_.push_back(arguments_.record);
       fine = figures_.lost.empty();
     }
     write(arguments_.save, [&] { simulation_.save(arguments_.save); });
-    write(arguments_.plot, [&] { plot::draw(arguments_.plot, energy_chart(arguments_, simulation_, figures_)); });
+    write(arguments_.plot, [&] { plot::draw(arguments_.plot, run_charts(arguments_, simulation_, figures_)); });
     write(arguments_.json, [&] { write_json(arguments_.json, run_json(arguments_, simulation_, figures_)); });
     return fine;
   }
@@ -135,9 +145,28 @@ class Execution {
   /// Rows that were recorded before the disk was full are kept.
   void keep_recording() {
     const std::string before = figures_.lost;
-    if (before.empty() || recorder_->rows() > 0) recording([&] { recorder_->commit(); });
-    if (!before.empty() && figures_.lost != before) return;  // they cannot be kept either
-    figures_.rows = recorder_->rows();
+    recording([&] { file_->commit(); });
+    if (!before.empty()) figures_.lost = before;
+    figures_.rows = file_->frames();
+  }
+
+  void begin_traces() {
+    if (!observer_) observer_.emplace(simulation_, arguments_.what);
+    constexpr std::size_t kMostRows = 64;  // kept; what is drawn of them says run_charts
+    for (std::size_t k = 0; k < observer_->arrays().size(); ++k) {
+      const RecordedArray& array = observer_->arrays()[k];
+      QuantityTrace& trace = figures_.traces.emplace_back(QuantityTrace{observer_->quantity_of_array()[k], array.name, array.rows, array.rows.size(), {}});
+      trace.rows.resize(std::min(kMostRows, trace.all));
+      trace.points.resize(trace.rows.size());
+    }
+  }
+
+  void record(const Energy& energy) {
+    if (!file_ || !figures_.lost.empty()) return;
+    const double total = energy.total();
+    const auto status = static_cast<std::uint8_t>(figures_.run.last.status);
+    recording([&] { file_->add(simulation_.time(), observer_->look(), {&total, 1}, {&status, 1}); });
+    last_record_ = figures_.run.steps;
   }
 
   void sample() {
@@ -146,29 +175,36 @@ class Execution {
     figures_.given = simulation_.effect_work().given();
     figures_.energy.add(simulation_.time(), energy, figures_.taken, figures_.given);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
-    if (recorder_ && figures_.lost.empty()) {
-      recording([&] { recorder_->add(simulation_.time(), energy.total(), simulation_.positions()); });
+    if (figures_.run.steps % arguments_.every == 0) record(energy);
+    if (!figures_.traces.empty()) {
+      const auto numbers = observer_->look();
+      for (std::size_t k = 0; k < figures_.traces.size(); ++k) {
+        std::vector<std::vector<plot::Point>>& rows = figures_.traces[k].points;
+        for (std::size_t row = 0; row < rows.size(); ++row) trace(rows[row], {simulation_.time(), numbers[k][row]});
+      }
+    } else if (!arguments_.plot.empty()) {
+      // what effects took is still in the account, what they gave is not
+      trace(figures_.trace, {simulation_.time(), energy.total() + figures_.taken - figures_.given - figures_.energy.initial()});
     }
-    // what effects took is still in the account, what they gave is not
-    if (!arguments_.plot.empty()) trace({simulation_.time(), energy.total() + figures_.taken - figures_.given - figures_.energy.initial()});
     last_sample_ = figures_.run.steps;
     next_sample_ = figures_.run.steps + figures_.sampled_every;
   }
 
-  void trace(plot::Point point) {
+  void trace(std::vector<plot::Point>& points, plot::Point point) const {
     // the picture is some 640 columns wide: of the samples in one 4,000th of the run only the extremes can be seen
     constexpr std::size_t kMostPoints = 1 << 16;
     constexpr double kColumns = 4000;
-    figures_.trace.push_back(point);
-    if (figures_.trace.size() < kMostPoints) return;
-    figures_.trace = plot::thinned(figures_.trace, static_cast<double>(figures_.steps_planned) * simulation_.options().step / kColumns);
+    points.push_back(point);
+    if (points.size() < kMostPoints) return;
+    points = plot::thinned(points, static_cast<double>(figures_.steps_planned) * simulation_.options().step / kColumns);
   }
 
   const RunArguments& arguments_;
   Simulation& simulation_;
   RunFigures figures_;
-  std::optional<Recorder> recorder_;
-  std::int64_t last_sample_ = -1, next_sample_ = 0;
+  std::optional<Observer> observer_;  // of what is recorded or plotted
+  std::optional<RolloutFile<double>> file_;
+  std::int64_t last_sample_ = -1, last_record_ = -1, next_sample_ = 0;
   std::vector<std::string> written_;
 };
 
