@@ -13,6 +13,7 @@
 
 #include "engine/required_model.hpp"
 #include "engine/step/instance_stepper.hpp"
+#include "engine/threads.hpp"
 #include "layout/input_error.hpp"
 #include "layout/packed_history.hpp"
 
@@ -107,6 +108,7 @@ struct BatchOf<Real>::Data {
                 std::max(static_cast<std::size_t>(threads),
                          oneapi::tbb::global_control::active_value(oneapi::tbb::global_control::max_allowed_parallelism))),
         arena(threads) {
+    require_threads(threads);
     blocks = (size + lanes - 1) / lanes;
     const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
     q.resize(rows(shape().positions));

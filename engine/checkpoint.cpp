@@ -1,7 +1,9 @@
 // Checkpoints of a Simulation: one line of text, then the raw numbers.
 //
-//   "linden checkpoint 5\n"
-//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of the stepper's numbers (little endian, as laid out below)
+//   "linden checkpoint 6\n"
+//   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of the stepper's numbers, bytes of the text
+//   that follows (little endian, as laid out below)
+//   kinds of effects and what they act on (engine/effect_owners.hpp); their numbers may be others
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
 //   where a step has sub-steps, what their first guesses know (engine/step/stage_guess.hpp): counts, numbers
 //   what effects or the solver keep from step to step, 8 bytes a number
@@ -13,8 +15,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <system_error>
 
+#include "engine/effect_owners.hpp"
 #include "engine/files/output_file.hpp"
 #include "engine/simulation.hpp"
 #include "layout/input_error.hpp"
@@ -23,7 +28,8 @@
 namespace linden {
 namespace {
 
-constexpr std::string_view kMagic = "linden checkpoint 5\n", kAnyFormat = "linden checkpoint ";
+constexpr std::string_view kMagic = "linden checkpoint 6\n", kAnyFormat = "linden checkpoint ";
+constexpr std::int64_t kMostText = 1 << 26;  // bytes
 constexpr std::int64_t kMostSteps = std::int64_t{1} << 53;  // beyond it their count times the step has no double of its own
 
 struct Header {
@@ -34,9 +40,10 @@ struct Header {
   std::int64_t steps;
   std::int64_t history;
   std::int64_t order;
-  std::int64_t kept;  // numbers that effects or the solver keep
+  std::int64_t kept;     // numbers that effects or the solver keep
+  std::int64_t effects;  // bytes
 };
-static_assert(sizeof(Header) == 88, "a checkpoint's header has no padding");
+static_assert(sizeof(Header) == 96, "a checkpoint's header has no padding");
 
 std::uint64_t checksum(std::string_view bytes) {
   std::uint64_t state = 14695981039346656037ull;
@@ -58,6 +65,7 @@ std::int64_t count_of(const std::vector<std::span<double>>& memory) {
 }  // namespace
 
 void Simulation::save(const std::string& file) {
+  const std::string effects = effect_owners(*plan_, model_->names);
   const Header header{model_->hash(),
                       options_.step,
                       {options_.gravity[0], options_.gravity[1], options_.gravity[2]},
@@ -66,9 +74,11 @@ void Simulation::save(const std::string& file) {
                       steps_,
                       history_,
                       options_.order,
-                      count_of(stepper_->memory())};
+                      count_of(stepper_->memory()),
+                      static_cast<std::int64_t>(effects.size())};
   std::string bytes(kMagic);
   append(bytes, &header, 1);
+  bytes += effects;
   State<double>::each(state_, [&](const char*, const auto& field, Rows, const char*) {
     append(bytes, field.flat().data(), field.flat().size());
   });
@@ -84,6 +94,11 @@ void Simulation::save(const std::string& file) {
 }
 
 void Simulation::load(const std::string& file) {
+  std::error_code ignored;
+  const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {  // opening a pipe waits for who writes to it
+    throw InputError(fmt::format("{}: this is not an ordinary file; expected a checkpoint that linden saved", file));
+  }
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: the checkpoint cannot be read; does the file exist?", file));
   std::string bytes;
@@ -93,7 +108,7 @@ void Simulation::load(const std::string& file) {
     in.read(bytes.data() + before, static_cast<std::streamsize>(size - before));
     bytes.resize(before + static_cast<std::size_t>(in.gcount()));
   };
-  const std::size_t body = kMagic.size() + sizeof(Header);
+  std::size_t body = kMagic.size() + sizeof(Header);
   read_to(body);
   if (!bytes.starts_with(kMagic) && bytes.starts_with(kAnyFormat)) {
     throw InputError(fmt::format("{}: this checkpoint was saved by another version of linden, in another format; expected one that begins "
@@ -118,10 +133,24 @@ void Simulation::load(const std::string& file) {
                                  "same run",
                                  file, header.order, options_.order));
   }
+  if (header.effects < 0 || header.effects > kMostText) {
+    throw InputError(fmt::format("{}: the checkpoint is damaged: it holds {} bytes about effects; load another", file, header.effects));
+  }
+  const std::size_t text = body;
+  body += static_cast<std::size_t>(header.effects);
+  read_to(body);
+  if (bytes.size() < body) throw InputError(fmt::format("{}: the checkpoint is cut short", file));
+  const std::string_view saved = std::string_view(bytes).substr(text);
+  if (const std::string here = effect_owners(*plan_, model_->names); saved != here) {
+    const OwnersDifference other = first_difference(saved, here);
+    throw InputError(fmt::format("{}: this checkpoint was saved with {}, the simulation has {}, so it would not continue the same run; load it "
+                                 "with the effects that it was saved with (their numbers may be others)",
+                                 file, other.saved, other.here));
+  }
   const std::vector<std::span<double>> memory = stepper_->memory();
   if (header.kept != count_of(memory)) {
-    throw InputError(fmt::format("{}: this checkpoint was made with other effects or another way to solve than the simulation has, so it "
-                                 "would not continue the same run; load it with the scene and options that it was made with",
+    throw InputError(fmt::format("{}: this checkpoint was made with another way to solve than the simulation has, so it would not "
+                                 "continue the same run; load it with the options that it was made with",
                                  file));
   }
   if (header.step != options_.step || !std::equal(std::begin(header.gravity), std::end(header.gravity), options_.gravity.begin())) {
@@ -176,6 +205,7 @@ void Simulation::load(const std::string& file) {
   steps_ = header.steps;
   history_ = static_cast<int>(header.history);
   effect_work_ = {};
+  if (impulses_) impulses_->clear();
   watch_.emplace(*model_, plan_->effects);
   stepper_->refresh(state_);
 }

@@ -10,6 +10,7 @@
 #include "engine/scene/scene.hpp"
 #include "engine/step/composition.hpp"
 #include "engine/step/instance_stepper.hpp"
+#include "engine/threads.hpp"
 #include "kernels/mimic.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
@@ -31,6 +32,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
     : model_(required(std::move(model))), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
       stepper_(make_stepper(*model_, options, *plan_)) {
+  if (model_->tree.most_threads() > 1) require_threads(threads_here());
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
@@ -58,6 +60,7 @@ void Simulation::check_row_count(const char* what, std::size_t found, Index expe
 
 void Simulation::changed() {
   history_ = 0;
+  if (impulses_) impulses_->clear();
   stepper_->forget();
   std::ranges::fill(state_.history.flat(), 0.0);
   if (stage_guess_) stage_guess_->forget();
@@ -158,6 +161,7 @@ StepReport Simulation::take_step(bool another) {
   const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, another);
   if (report.ok()) {
     ++steps_;
+    if (impulses_ && !stage_guess_) *impulses_ = stepper_->impulses();
     effect_work_.add(stepper_->effect_account().work);
     if (plan_->any()) watch_->add(stepper_->effect_account(), time());
   }
@@ -176,6 +180,10 @@ StepReport Simulation::step_in_stages() {
     const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step, false);
     whole.add(report);
     if (report.ok()) {
+      if (impulses_) {
+        if (i == 0) impulses_->clear();
+        impulses_->add(stepper_->impulses());
+      }
       if (history_ > 0) {
         stage_guess_->learn(i, state_.history);
       } else {
@@ -190,6 +198,47 @@ StepReport Simulation::step_in_stages() {
     break;
   }
   return whole;
+}
+
+void Simulation::keep_forces() {
+  if (impulses_) return;
+  stepper_->keep_impulses();
+  impulses_ = stepper_->impulses();
+}
+
+std::vector<double> Simulation::mean_forces(const std::vector<double>& impulses) const {
+  std::vector<double> forces = impulses;
+  for (double& number : forces) number /= options_.step;
+  return forces;
+}
+
+namespace {
+
+const StepImpulses& kept(const std::optional<StepImpulses>& impulses) {
+  if (!impulses) throw InputError("forces of effects were asked for and none are kept; call keep_forces before the step");
+  return *impulses;
+}
+
+}  // namespace
+
+std::vector<double> Simulation::joint_forces() const {
+  std::vector<double> forces = mean_forces(kept(impulses_).joints);
+  forces.resize(static_cast<std::size_t>(model_->tree.shape.velocities));  // without effects there are none
+  return forces;
+}
+
+std::vector<double> Simulation::servo_torques() const { return mean_forces(kept(impulses_).servos); }
+
+std::vector<BodyContact> Simulation::contacts() const {
+  const StepImpulses& impulses = kept(impulses_);
+  std::vector<BodyContact> bodies;
+  for (std::size_t k = 0; k < impulses.ground.size(); ++k) {
+    const Index slot = plan_->ground.points[k].slot;
+    if (bodies.empty() || bodies.back().slot != slot) bodies.push_back({slot});
+    bodies.back().closed += impulses.closed[k];
+    bodies.back().normal_force += impulses.ground[k] / options_.step;
+  }
+  return bodies;
 }
 
 Energy Simulation::energy() { return stepper_->energy_of(state_, rate_); }

@@ -36,6 +36,13 @@ struct Momentum {
   std::array<double, 3> linear{};   // [kg m/s]
 };
 
+/// How the ground holds a body, in the step taken last.
+struct BodyContact {
+  Index slot;
+  int closed = 0;           // contact points that it pushes at the end of the step
+  double normal_force = 0;  // of all of them, mean over the step [N]
+};
+
 class Simulation {
  public:
   /// At rest in the model's zero configuration, but for joints whose motion is given. Throws InputError for options and effects that make no sense, and for a null pointer.
@@ -46,6 +53,8 @@ class Simulation {
 
   const Model& model() const { return *model_; }
   const Options& options() const { return options_; }
+  /// As they act: what stood on followers of mimic joints is on their leaders.
+  const Effects& effects() const { return plan_->effects; }
   double time() const { return static_cast<double>(steps_) * options_.step; }
   std::int64_t steps() const { return steps_; }
 
@@ -83,6 +92,17 @@ class Simulation {
   StepsReport run(std::int64_t steps);
   std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
 
+  /// From the next step on it is kept what effects applied, at the cost of a pass up the tree a step where something acts on bodies. What
+  /// follows is zero before that, and throws InputError where this was not called.
+  void keep_forces();
+  /// Mean over the step taken last: generalized forces of all effects together [nv; N m, N], conjugate to the velocities. Gravity, armature
+  /// and set_forces are not among them, nor blows at limits, which have no duration.
+  std::vector<double> joint_forces() const;
+  /// Likewise of each servo [N m, N], in the order of Effects::servos.
+  std::vector<double> servo_torques() const;
+  /// Of every body that may touch the ground, sorted by slot.
+  std::vector<BodyContact> contacts() const;
+
   Energy energy();
   /// What effects gave and took since the start, or since a checkpoint was loaded [J]. Total energy plus what was taken less what was given
   /// stays.
@@ -92,11 +112,13 @@ class Simulation {
   Momentum momentum();
 
   /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step,
-  /// order or gravity, a file that is cut short or is no checkpoint; the simulation is then unchanged.
+  /// order or gravity, effects on other joints or bodies (their numbers may be others), a file that is cut short or is no checkpoint; the
+  /// simulation is then unchanged.
   void save(const std::string& file);
   void load(const std::string& file);
 
  private:
+  std::vector<double> mean_forces(const std::vector<double>& impulses) const;
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
   StepReport take_step(bool another);
@@ -109,6 +131,7 @@ class Simulation {
   std::unique_ptr<Stepper> stepper_;
   Field<double> rate_;
   EffectWork effect_work_;
+  std::optional<StepImpulses> impulses_;  // of the step taken last, where they are kept
   std::optional<PassiveWatch> watch_;
   std::int64_t steps_ = 0;
   int history_ = 0;

@@ -13,8 +13,8 @@ namespace linden {
 
 enum class ElementType : std::uint8_t { float32, float64, uint8 };
 
-/// All functions throw std::runtime_error: `FILE: cannot be written: reason`. After that, as after commit, nothing but the destructor may
-/// be called.
+/// All functions throw std::runtime_error: `FILE: cannot be written: reason`. After that nothing but commit, which puts in place what was
+/// whole before, and the destructor may be called, after commit the destructor alone.
 class ArrayFile {
  public:
   ArrayFile() = default;
@@ -23,18 +23,24 @@ class ArrayFile {
   ArrayFile(const ArrayFile&) = delete;
   ArrayFile& operator=(const ArrayFile&) = delete;
 
-  /// An array [rows, row...] that has no rows yet.
-  virtual void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) = 0;
+  /// An array [rows, row...] that has no rows yet. columns: what its numbers are called in a table; empty: they are in none.
+  virtual void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string> columns) = 0;
   /// An array [words]. Words are UTF-8.
   virtual void add_words(const std::string& name, std::span<const std::string> words) = 0;
-  /// One row of the array that was added as number `array`, counted from 0, words not counted.
-  virtual void append(std::size_t array, const void* row) = 0;
+  /// A row of every array of numbers, in the order in which they were added. Where the disk has no room for all of them, and for what
+  /// commit needs, none is.
+  virtual void append(std::span<const void* const> rows) = 0;
   virtual void commit() = 0;
+  /// Rows that every array of numbers has; after commit, that are in place, also where it has failed.
+  virtual std::int64_t rows() const = 0;
 };
 
-/// For numpy.load: a zip of .npy files, not compressed. The arrays are gathered in a file each and copied at the commit, which for that
-/// time takes twice the space.
+/// For numpy.load: a zip of .npy files, not compressed. The arrays are gathered in a file each and copied at the commit, which takes
+/// twice the space; it is held from the beginning.
 std::unique_ptr<ArrayFile> npz_file(const std::string& file);
+
+/// A table: a line of names, then one a row, of all arrays that have names for their numbers. Words are left out.
+std::unique_ptr<ArrayFile> csv_file(const std::string& file);
 
 /// For h5py.File: HDF5, every array a chunked dataset, written where it stays.
 std::unique_ptr<ArrayFile> h5_file(const std::string& file);

@@ -19,6 +19,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kDigits = 8;
+constexpr std::string_view kAfterNumber = ".part";
+
+std::string before_number(const fs::path& place) { return fmt::format(".{}.linden.", place.filename().string()); }
+
+/// What is in a folder is on the disk by its names too, where the system can do that.
+int sync_folder(const fs::path& folder) {
+  const int file = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return 0;  // it may be written to and not be read
+  const int error = ::fsync(file) != 0 && errno != EINVAL ? errno : 0;
+  ::close(file);
+  return error;
+}
+
 /// The end of a chain of symbolic links, be there a file or not.
 fs::path followed(fs::path path) {
   constexpr int kMostLinks = 40;  // of Linux
@@ -64,8 +78,14 @@ Destination::Destination(std::string file) : file_(std::move(file)), place_(foll
 
 std::string Destination::temporary() const {
   fs::path path = place_;
-  path.replace_filename(fmt::format(".{}.{:08x}.part", path.filename().string(), std::random_device{}()));
+  path.replace_filename(fmt::format("{}{:08x}{}", before_number(place_), std::random_device{}(), kAfterNumber));
   return path.string();
+}
+
+bool Destination::is_temporary(std::string_view name) const {
+  const std::string before = before_number(place_);
+  if (name.size() != before.size() + kDigits + kAfterNumber.size() || !name.starts_with(before) || !name.ends_with(kAfterNumber)) return false;
+  return name.substr(before.size(), kDigits).find_first_not_of("0123456789abcdef") == name.npos;
 }
 
 void Destination::publish(const std::string& temporary) const {
@@ -81,6 +101,7 @@ void Destination::publish(const std::string& temporary) const {
   if (error == 0 && ::fsync(ready) != 0 && errno != EINVAL) error = errno;  // EINVAL: a file system that has no such thing
   ::close(ready);
   if (error == 0 && std::rename(temporary.c_str(), place_.c_str()) != 0) error = errno;
+  if (error == 0) error = sync_folder(place_.parent_path());
   if (error != 0) cannot_be_written(file_, error);
 }
 

@@ -4,7 +4,7 @@
 //   kind      an ordinary file, or a name that is free; folders, devices, pipes and sockets are never replaced
 //   links     a symbolic link is followed: what it leads to is replaced, the link stays
 //   replaced  the new file has the mode of the old one, and its owner and group where that is permitted
-//   disk      the bytes are on the disk before the name is theirs
+//   disk      the bytes are on the disk before the name is theirs, and the name is before publish returns
 #pragma once
 
 #include <filesystem>
@@ -27,8 +27,10 @@ class Destination {
   const std::string& file() const { return file_; }
   /// With links followed.
   const std::filesystem::path& place() const { return place_; }
-  /// A hidden name beside it that nobody else has.
+  /// A hidden name beside it that nobody else has: .NAME.linden.XXXXXXXX.part
   std::string temporary() const;
+  /// Whether a file of that name in its folder is such a one.
+  bool is_temporary(std::string_view name) const;
   /// Renames what is ready onto it. Throws cannot_be_written.
   void publish(const std::string& temporary) const;
 

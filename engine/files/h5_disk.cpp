@@ -8,12 +8,13 @@
 #include <limits>
 #include <utility>
 
+#include "engine/files/held_room.hpp"
+
 namespace linden {
 
 struct H5Disk::Face : H5FD_t {
   explicit Face(H5Disk* of) : H5FD_t{}, disk(of) {}
   H5Disk* disk;
-  haddr_t allocated = 0;
 };
 
 H5Disk::H5Disk(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
@@ -21,6 +22,17 @@ H5Disk::H5Disk(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_
 }
 
 H5Disk::~H5Disk() { close(); }
+
+int H5Disk::hold(std::size_t bytes) {
+  const std::size_t needed = allocated_ + bytes;
+  if (needed <= held_) return 0;
+  for (const std::size_t size : {needed + needed / 8, needed}) {  // a call for some rows, not for each
+    const int error = allocate(file_, size);
+    if (error == 0) held_ = size;
+    if (error == 0 || size == needed) return error;
+  }
+  return 0;
+}
 
 void H5Disk::close() {
   const int file = std::exchange(file_, -1);
@@ -57,8 +69,9 @@ void H5Disk::write(haddr_t at, std::size_t size, const std::byte* bytes, bool nu
 }
 
 void H5Disk::resize(haddr_t size) {
-  if (size == end_) return;
+  if (size == end_ && size >= held_) return;
   end_ = size;
+  held_ = 0;
   if (error_ == 0 && ::ftruncate(file_, static_cast<off_t>(size)) != 0) error_ = errno;
 }
 
@@ -84,9 +97,9 @@ H5FD_class_t H5Disk::driver() {
                 H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
     return 0;
   };
-  driver.get_eoa = [](const H5FD_t* face, H5FD_mem_t) { return static_cast<const Face*>(face)->allocated; };
+  driver.get_eoa = [](const H5FD_t* face, H5FD_mem_t) { return static_cast<const Face*>(face)->disk->allocated_; };
   driver.set_eoa = [](H5FD_t* face, H5FD_mem_t, haddr_t end) -> herr_t {
-    static_cast<Face*>(face)->allocated = end;
+    static_cast<Face*>(face)->disk->allocated_ = end;
     return 0;
   };
   driver.get_eof = [](const H5FD_t* face, H5FD_mem_t) { return static_cast<const Face*>(face)->disk->end_; };
@@ -99,7 +112,7 @@ H5FD_class_t H5Disk::driver() {
     return 0;
   };
   driver.truncate = [](H5FD_t* face, hid_t, hbool_t) -> herr_t {
-    static_cast<Face*>(face)->disk->resize(static_cast<Face*>(face)->allocated);
+    static_cast<Face*>(face)->disk->resize(static_cast<Face*>(face)->disk->allocated_);
     return 0;
   };
   return driver;

@@ -26,6 +26,9 @@ class H5Disk {
   hid_t access();
   /// The errno of what failed first; 0 = all is well.
   int error() const { return error_; }
+  /// Gives the file room on the disk for so many bytes beyond those that HDF5 has given out. Returns an errno, 0 where it has it or the
+  /// file system cannot do that.
+  int hold(std::size_t bytes);
   /// After the HDF5 file.
   void close();
 
@@ -38,7 +41,7 @@ class H5Disk {
   void resize(haddr_t size);
 
   int file_, error_ = 0;
-  haddr_t end_ = 0;
+  haddr_t end_ = 0, allocated_ = 0, held_ = 0;  // bytes: written, given out by HDF5, taken of the disk ahead
   std::vector<std::pair<haddr_t, std::vector<std::byte>>> kept_;  // places and bytes, the latest last
 };
 

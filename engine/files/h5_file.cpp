@@ -71,7 +71,7 @@ class H5File final : public ArrayFile {
  public:
   explicit H5File(const std::string& file) : folder_(file), disk_(folder_.file(kWhole)), file_(create()) {}
 
-  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) override {
+  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string>) override {
     const std::pair<hid_t, hid_t> types[] = {{H5T_IEEE_F32LE, H5T_NATIVE_FLOAT},
                                              {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE},
                                              {H5T_STD_U8LE, H5T_NATIVE_UINT8}};
@@ -86,8 +86,10 @@ class H5File final : public ArrayFile {
     const Handle creation = without_times();
     const std::vector<hsize_t> chunk = chunk_of(one_row, H5Tget_size(native));
     call(H5Pset_chunk, creation.id(), static_cast<int>(chunk.size()), chunk.data());
+    hsize_t room = H5Tget_size(native) * chunk[0];
+    for (std::size_t axis = 1; axis < chunk.size(); ++axis) room *= (one_row[axis - 1] + chunk[axis] - 1) / chunk[axis] * chunk[axis];
     arrays_.push_back({create(name, stored, space, creation),
-                       own(H5Sclose, H5Screate_simple, static_cast<int>(now.size()) - 1, now.data() + 1, nullptr), native, now});
+                       own(H5Sclose, H5Screate_simple, static_cast<int>(now.size()) - 1, now.data() + 1, nullptr), native, now, chunk[0], room});
   }
 
   void add_words(const std::string& name, std::span<const std::string> words) override {
@@ -106,8 +108,45 @@ class H5File final : public ArrayFile {
     finish(dataset);
   }
 
-  void append(std::size_t array, const void* row) override {
-    Array& to = arrays_[array];
+  void append(std::span<const void* const> rows) override {
+    require(true);
+    if (const int error = disk_.hold(row_room())) cannot_be_written(folder_.target(), error);
+    for (std::size_t k = 0; k < rows.size(); ++k) append(arrays_[k], rows[k]);
+    rows_ += 1;
+  }
+
+  std::int64_t rows() const override { return rows_; }
+
+  void commit() override {
+    const std::int64_t all = std::exchange(rows_, 0);
+    for (Array& array : arrays_) finish(array.dataset);
+    finish(file_);
+    disk_.close();
+    require(true);
+    folder_.publish(kWhole);
+    rows_ = all;
+  }
+
+ private:
+  struct Array {
+    Handle dataset, row;         // row: one row in memory
+    hid_t type;                  // in memory
+    std::vector<hsize_t> shape;  // [rows, row...]
+    hsize_t chunk_rows;          // of a chunk
+    hsize_t chunk_bytes;         // of the chunks that a row lies in
+  };
+
+  /// Room that the next row of all arrays takes at most: chunks that begin with it, and places in their index.
+  hsize_t row_room() const {
+    constexpr hsize_t kOfStructure = 1 << 14;
+    hsize_t room = kOfStructure;
+    for (const Array& array : arrays_) {
+      if (array.shape[0] % array.chunk_rows == 0) room += array.chunk_bytes + kOfStructure;
+    }
+    return room;
+  }
+
+  void append(Array& to, const void* row) {
     std::vector<hsize_t> start(to.shape.size(), 0), count = to.shape;
     start[0] = std::exchange(to.shape[0], to.shape[0] + 1);
     count[0] = 1;
@@ -117,20 +156,6 @@ class H5File final : public ArrayFile {
     call(H5Dwrite, to.dataset.id(), to.type, to.row.id(), place.id(), H5P_DEFAULT, row);
   }
 
-  void commit() override {
-    for (Array& array : arrays_) finish(array.dataset);
-    finish(file_);
-    disk_.close();
-    require(true);
-    folder_.publish(kWhole);
-  }
-
- private:
-  struct Array {
-    Handle dataset, row;         // row: one row in memory
-    hid_t type;                  // in memory
-    std::vector<hsize_t> shape;  // [rows, row...]
-  };
   static constexpr const char* kWhole = "whole.h5";
 
   /// HDF5's functions that return an error ...
@@ -158,6 +183,8 @@ class H5File final : public ArrayFile {
 
   Handle create() {
     const Handle access = own(H5Pclose, [this] { return disk_.access(); });
+    // no chunk waits in memory: what there is room for is asked row by row
+    call(H5Pset_cache, access.id(), 0, 1, 0, 1.0);
     return own(H5Fclose, H5Fcreate, kWhole, H5F_ACC_TRUNC, H5P_DEFAULT, access.id());
   }
 
@@ -175,6 +202,7 @@ class H5File final : public ArrayFile {
   H5Disk disk_;
   Handle file_;
   std::vector<Array> arrays_;
+  std::int64_t rows_ = 0;
 };
 
 }  // namespace

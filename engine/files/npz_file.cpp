@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
-#include <cstdio>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -14,6 +12,8 @@
 #include <utility>
 
 #include "engine/files/array_file.hpp"
+#include "engine/files/growing_file.hpp"
+#include "engine/files/held_room.hpp"
 #include "engine/files/temporary_folder.hpp"
 
 namespace linden {
@@ -23,9 +23,6 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 
 constexpr std::uint16_t kFirstDay = 1 << 5 | 1;  // 1 January 1980, the first date a zip can hold: numpy.savez writes it too
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
 struct DiscardZip {
   void operator()(zip_t* zip) const { zip_discard(zip); }
 };
@@ -68,14 +65,14 @@ std::u32string code_points(std::string_view utf8) {
 
 class NpzFile final : public ArrayFile {
  public:
-  explicit NpzFile(const std::string& file) : folder_(file) {}
+  explicit NpzFile(const std::string& file) : folder_(file), held_(folder_.file("room")) {}
 
-  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row) override {
+  void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string>) override {
     constexpr std::pair<const char*, std::int64_t> kTypes[] = {{"<f4", 4}, {"<f8", 8}, {"|u1", 1}};
     const auto [code, size] = kTypes[static_cast<std::size_t>(type)];
     const std::int64_t bytes = std::accumulate(row.begin(), row.end(), size, std::multiplies<>());
     numbers_.push_back(arrays_.size());
-    begin({.name = name, .type = code, .row = std::move(row), .row_bytes = static_cast<std::size_t>(bytes)});
+    begin(name, code, std::move(row), static_cast<std::size_t>(bytes));
   }
 
   void add_words(const std::string& name, std::span<const std::string> words) override {
@@ -83,19 +80,38 @@ class NpzFile final : public ArrayFile {
     std::ranges::transform(words, decoded.begin(), code_points);
     std::size_t longest = 1;
     for (const std::u32string& word : decoded) longest = std::max(longest, word.size());
-    begin({.name = name, .type = fmt::format("<U{}", longest), .row = {}, .row_bytes = longest * sizeof(char32_t)});
+    Array& array = begin(name, fmt::format("<U{}", longest), {}, longest * sizeof(char32_t));
     for (std::u32string& word : decoded) {
       word.resize(longest);
-      add_row(arrays_.back(), word.data());
+      array.out.append({reinterpret_cast<const char*>(word.data()), array.row_bytes});
     }
+    array.rows = static_cast<std::int64_t>(words.size());
   }
 
-  void append(std::size_t array, const void* row) override { add_row(arrays_[numbers_[array]], row); }
+  void append(std::span<const void* const> rows) override {
+    hold_room(rows_ + 1);
+    try {
+      for (std::size_t k = 0; k < rows.size(); ++k) arrays_[numbers_[k]].out.append({static_cast<const char*>(rows[k]), arrays_[numbers_[k]].row_bytes});
+    } catch (...) {
+      keep_whole_rows();
+      throw;
+    }
+    rows_ += 1;
+  }
+
+  std::int64_t rows() const override { return rows_; }
 
   void commit() override {
-    for (Array& array : arrays_) finish(array);
+    held_.release();
+    for (const std::size_t k : numbers_) arrays_[k].rows = rows_;
+    const std::int64_t all = std::exchange(rows_, 0);
+    for (Array& array : arrays_) {
+      array.out.rewrite(array.header());
+      array.out.flush();
+    }
     assemble();
     folder_.publish(kWhole);
+    rows_ = all;
   }
 
  private:
@@ -103,39 +119,40 @@ class NpzFile final : public ArrayFile {
     std::string name, type;
     std::vector<std::int64_t> row;  // shape
     std::size_t row_bytes;
+    GrowingFile out;
     std::int64_t rows = 0;
-    std::unique_ptr<std::FILE, CloseFile> out = nullptr;
 
     std::string file() const { return name + ".npy"; }
     std::string header() const { return npy_header(type, rows, row); }
   };
   static constexpr const char* kWhole = "whole.npz";
 
-  void begin(Array array) {
-    array.out.reset(std::fopen(folder_.file(array.file()).c_str(), "wbx"));
-    if (!array.out) cannot_be_written(folder_.target(), errno);
-    const std::string header = array.header();
-    write(array, header.data(), header.size());
-    arrays_.push_back(std::move(array));
+  Array& begin(const std::string& name, std::string type, std::vector<std::int64_t> row, std::size_t row_bytes) {
+    GrowingFile out(folder_.file(name + ".npy"), folder_.target());
+    Array& array = arrays_.emplace_back(Array{name, std::move(type), std::move(row), row_bytes, std::move(out)});
+    array.out.append(array.header());
+    return array;
   }
 
-  void add_row(Array& array, const void* row) {
-    write(array, row, array.row_bytes);
-    array.rows += 1;
+  /// Room for the packed file with so many rows, and for what is still to be written of its parts.
+  void hold_room(std::int64_t rows) {
+    constexpr std::size_t kOfEntry = 512;  // of a zip, at most: its headers and its name twice
+    std::size_t bytes = kOfEntry;
+    for (const Array& array : arrays_) bytes += kOfEntry + 2 * array.out.buffered() + array.header().size() + static_cast<std::size_t>(array.rows) * array.row_bytes;
+    for (const std::size_t k : numbers_) bytes += (static_cast<std::size_t>(rows) - static_cast<std::size_t>(arrays_[k].rows)) * arrays_[k].row_bytes;
+    if (const int error = held_.grow(bytes)) cannot_be_written(folder_.target(), error);
   }
 
-  void write(Array& array, const void* bytes, std::size_t count) {
-    errno = 0;
-    if (count > 0 && std::fwrite(bytes, 1, count, array.out.get()) != count) cannot_be_written(folder_.target(), errno);
-  }
-
-  /// The header again, now that the rows are counted.
-  void finish(Array& array) {
-    errno = 0;
-    if (std::fseek(array.out.get(), 0, SEEK_SET) != 0) cannot_be_written(folder_.target(), errno);
-    const std::string header = array.header();
-    write(array, header.data(), header.size());
-    if (std::fclose(array.out.release()) != 0) cannot_be_written(folder_.target(), errno);
+  /// Where the disk was full although room was held: the rows that every array has.
+  void keep_whole_rows() {
+    held_.release();
+    for (const std::size_t k : numbers_) {
+      arrays_[k].out.settle();
+      rows_ = std::min(rows_, arrays_[k].out.records() - 1);
+    }
+    for (const std::size_t k : numbers_) {
+      arrays_[k].out.cut(static_cast<std::int64_t>(arrays_[k].header().size() + static_cast<std::size_t>(rows_) * arrays_[k].row_bytes), rows_ + 1);
+    }
   }
 
   void assemble() {
@@ -171,8 +188,10 @@ class NpzFile final : public ArrayFile {
   }
 
   TemporaryFolder folder_;
+  HeldRoom held_;
   std::vector<Array> arrays_;
   std::vector<std::size_t> numbers_;  // places in arrays_ of those that grow
+  std::int64_t rows_ = 0;             // that they all have
 };
 
 }  // namespace

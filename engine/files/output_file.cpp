@@ -5,34 +5,29 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "engine/files/leftovers.hpp"
+#include "engine/standard_streams.hpp"
 #include "layout/input_error.hpp"
 
 namespace linden {
 
-OutputFile::OutputFile(std::string target) : target_(std::move(target)), temporary_(target_.temporary()) {
-  errno = 0;
-  file_ = std::fopen(temporary_.c_str(), "wbx");
-  if (!file_) cannot_be_written(target_.file(), errno);
-}
+OutputFile::OutputFile(std::string target)
+    : target_(std::move(target)), temporary_(target_.temporary()), file_(temporary_, target_.file()) {}
 
 OutputFile::~OutputFile() {
-  if (file_) std::fclose(file_);
   if (!temporary_.empty()) std::remove(temporary_.c_str());
 }
 
-void OutputFile::write(std::string_view bytes) {
-  errno = 0;
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) cannot_be_written(target_.file(), errno);
-}
+void OutputFile::write(std::string_view record) { file_.append(record); }
 
 void OutputFile::commit() {
-  errno = 0;
-  if (std::fclose(std::exchange(file_, nullptr)) != 0) cannot_be_written(target_.file(), errno);
+  file_.flush();
   target_.publish(temporary_);
   temporary_.clear();
 }
@@ -81,6 +76,11 @@ Outputs::Outputs(std::initializer_list<Output> outputs) {
                                    output.option, output.file));
     }
     outputs_.push_back(output);
+  }
+  for (const Output& output : outputs_) {
+    for (const std::string& left : remove_leftovers(Destination(output.file))) {
+      tell("{}: removed; it was left by a process that was killed while it wrote {}", left, output.file);
+    }
   }
 }
 

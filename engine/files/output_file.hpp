@@ -2,13 +2,14 @@
 // Files that appear whole or not at all: a temporary file beside the destination is renamed onto it when all is written.
 #pragma once
 
-#include <cstdio>
+#include <cstdint>
 #include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "engine/files/destination.hpp"
+#include "engine/files/growing_file.hpp"
 
 namespace linden {
 
@@ -21,13 +22,19 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  void write(std::string_view bytes);
+  /// Bytes that stay together: where the disk is full in the midst of them commit puts in place what was whole before.
+  void write(std::string_view record);
   void commit();
+  /// Of what was written for commit only what finds room.
+  void settle() { file_.settle(); }
+
+  /// Records that are kept.
+  std::int64_t records() const { return file_.records(); }
 
  private:
   Destination target_;
   std::string temporary_;  // empty when it is no more
-  std::FILE* file_ = nullptr;
+  GrowingFile file_;
 };
 
 /// Writes a whole file.
@@ -43,7 +50,8 @@ struct Output {
 /// What a command is to write, looked at before long work.
 class Outputs {
  public:
-  /// Throws InputError where one cannot be written or two of them are one file.
+  /// Throws InputError where one cannot be written or two of them are one file. What processes that were killed left of them is told and
+  /// removed.
   Outputs(std::initializer_list<Output> outputs);
   /// Throws InputError where one of them is a file that is read, whatever path or link leads there.
   void spare(const std::vector<std::string>& read) const;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/files/output_file.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 
 namespace linden {
@@ -19,7 +20,7 @@ bool attempt(const std::function<void()>& write) {
     write();
     return true;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "linden: {}\n", printable(error.what()));
+    tell_text(error.what());
     return false;
   }
 }

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <iterator>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 #include <type_traits>
@@ -19,50 +20,58 @@ namespace {
 const std::string kStatuses[] = {"converged", "not_converged", "past_pi", "gains_energy", "not_finite"};
 static_assert(std::size(kStatuses) == static_cast<std::size_t>(StepStatus::not_finite) + 1, "every status has a name");
 
-std::unique_ptr<ArrayFile> array_file(const std::string& file) {
+std::unique_ptr<ArrayFile> array_file(const std::string& file, std::int64_t instances) {
   const std::string ending = std::filesystem::path(file).extension().string();
   if (ending == ".npz") return npz_file(file);
   if (ending == ".h5") return h5_file(file);
+  if (ending == ".csv" && instances == 1) return csv_file(file);
   cannot_be_written(file, fmt::format("the file's name ends in \"{}\"; expected .npz or .h5", ending));
 }
 
-void require_length(std::string_view what, std::size_t found, std::int64_t expected) {
-  if (found == static_cast<std::size_t>(expected)) return;
+void require_length(std::string_view what, std::size_t found, std::size_t expected) {
+  if (found == expected) return;
   throw std::invalid_argument(fmt::format("a frame with {} numbers of {}; expected {}", found, what, expected));
+}
+
+std::vector<std::string> prefixed(const std::string& prefix, std::vector<std::string> names) {
+  for (std::string& name : names) name.insert(0, prefix);
+  return names;
 }
 
 }  // namespace
 
+RecordedArray recorded_positions(const Names& names) { return {"q", "positions", names.position, ""}; }
+RecordedArray recorded_velocities(const Names& names) { return {"v", "velocities", names.velocity, "v."}; }
+
 template <class Real>
 struct RolloutFile<Real>::Data {
   std::string file;
-  std::int64_t instances, nq, nv, frames = 0;
-  std::unique_ptr<ArrayFile> arrays;  // none when all is done or something failed
+  std::int64_t instances;
+  std::vector<RecordedArray> recorded;
+  std::unique_ptr<ArrayFile> arrays;  // none when all is done
+  bool failed = false;
+  std::int64_t frames = 0;  // that were committed
 
-  template <class Work>
-  void write(Work work) {
-    if (!arrays) cannot_be_written(file, "it is committed or has failed before");
-    try {
-      work(*arrays);
-    } catch (...) {
-      arrays.reset();
-      throw;
-    }
+  void require_open() const {
+    if (!arrays || failed) cannot_be_written(file, "it is committed or has failed before");
   }
 };
 
 template <class Real>
-RolloutFile<Real>::RolloutFile(const std::string& file, const Names& names, std::int64_t instances)
-    : data_(new Data{file, instances, std::ssize(names.position), std::ssize(names.velocity), 0, array_file(file)}) {
+RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> recorded)
+    : data_(new Data{file, instances, std::move(recorded), array_file(file, instances)}) {
   constexpr ElementType kReal = std::is_same_v<Real, float> ? ElementType::float32 : ElementType::float64;
   ArrayFile& arrays = *data_->arrays;
-  arrays.add_numbers("time", ElementType::float64, {});
-  arrays.add_numbers("q", kReal, {instances, data_->nq});
-  arrays.add_numbers("v", kReal, {instances, data_->nv});
-  arrays.add_numbers("energy", kReal, {instances});
-  arrays.add_numbers("status", ElementType::uint8, {instances});
-  arrays.add_words("positions", names.position);
-  arrays.add_words("velocities", names.velocity);
+  arrays.add_numbers("time", ElementType::float64, {}, {"time"});
+  arrays.add_numbers("energy", kReal, {instances}, {"energy"});
+  for (const RecordedArray& array : data_->recorded) {
+    arrays.add_numbers(array.name, kReal, {instances, std::ssize(array.rows)}, prefixed(array.prefix, array.rows));
+  }
+  arrays.add_numbers("status", ElementType::uint8, {instances}, {});
+  std::set<std::string> named;
+  for (const RecordedArray& array : data_->recorded) {
+    if (named.insert(array.names).second) arrays.add_words(array.names, array.rows);
+  }
   arrays.add_words("statuses", kStatuses);
 }
 
@@ -70,31 +79,44 @@ template <class Real>
 RolloutFile<Real>::~RolloutFile() = default;
 
 template <class Real>
-void RolloutFile<Real>::add(double time, std::span<const Real> q, std::span<const Real> v, std::span<const Real> energy,
+void RolloutFile<Real>::add(double time, std::span<const std::span<const Real>> arrays, std::span<const Real> energy,
                             std::span<const std::uint8_t> status) {
-  require_length("q", q.size(), data_->instances * data_->nq);
-  require_length("v", v.size(), data_->instances * data_->nv);
-  require_length("energy", energy.size(), data_->instances);
-  require_length("status", status.size(), data_->instances);
-  data_->write([&](ArrayFile& arrays) {
-    std::size_t array = 0;  // in the order in which they were added
-    for (const void* row : {static_cast<const void*>(&time), static_cast<const void*>(q.data()), static_cast<const void*>(v.data()),
-                            static_cast<const void*>(energy.data()), static_cast<const void*>(status.data())}) {
-      arrays.append(array++, row);
-    }
-  });
-  data_->frames += 1;
+  const auto n = static_cast<std::size_t>(data_->instances);
+  require_length("energy", energy.size(), n);
+  require_length("status", status.size(), n);
+  if (arrays.size() != data_->recorded.size()) {
+    throw std::invalid_argument(fmt::format("a frame of {} arrays; expected {}", arrays.size(), data_->recorded.size()));
+  }
+  std::vector<const void*> rows{&time, energy.data()};
+  for (std::size_t k = 0; k < arrays.size(); ++k) {
+    require_length(data_->recorded[k].name, arrays[k].size(), n * data_->recorded[k].rows.size());
+    rows.push_back(arrays[k].data());
+  }
+  rows.push_back(status.data());
+  data_->require_open();
+  data_->failed = true;
+  data_->arrays->append(rows);
+  data_->failed = false;
 }
 
 template <class Real>
 void RolloutFile<Real>::commit() {
-  data_->write([](ArrayFile& arrays) { arrays.commit(); });
-  data_->arrays.reset();
+  if (!data_->arrays) data_->require_open();
+  const std::unique_ptr<ArrayFile> arrays = std::move(data_->arrays);
+  data_->frames = arrays->rows();
+  if (data_->failed && data_->frames == 0) cannot_be_written(data_->file, "the disk has no room for one frame");
+  try {
+    arrays->commit();
+  } catch (const std::runtime_error&) {
+    data_->frames = arrays->rows();  // of a table there may be some
+    throw;
+  }
+  data_->frames = arrays->rows();
 }
 
 template <class Real>
 std::int64_t RolloutFile<Real>::frames() const {
-  return data_->frames;
+  return data_->arrays ? data_->arrays->rows() : data_->frames;
 }
 
 template class RolloutFile<double>;

@@ -27,6 +27,7 @@ class TemporaryFolder {
  private:
   Destination target_;
   std::string folder_;
+  int held_ = -1;  // the folder, locked while it is written (leftovers.hpp)
 };
 
 }  // namespace linden

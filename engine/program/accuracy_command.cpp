@@ -12,6 +12,7 @@
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
 
@@ -44,9 +45,8 @@ AccuracySetup setup_of(const AccuracyArguments& arguments, const Outputs& output
   return setup;
 }
 
-AccuracyFigures measure(const AccuracySetup& setup, int& signal) {
+AccuracyFigures measure(const AccuracySetup& setup, const Interrupt& interrupt, int& signal) {
   constexpr double kTick = 0.1;  // [s]
-  const Interrupt interrupt;
   Progress progress(std::max<std::int64_t>(1, std::llround(setup.budget / kTick)), kTick, "s of the budget");
   const auto go_on = [&](double gone) {
     progress.update(std::llround(std::min(gone, setup.budget) / kTick), Progress::Clock::now());
@@ -62,8 +62,9 @@ AccuracyFigures measure(const AccuracySetup& setup, int& signal) {
 int accuracy_command(const AccuracyArguments& arguments) {
   const AccuracySetup setup = setup_of(arguments, checked_outputs(arguments));
   print_warnings(*setup.model);
+  const Interrupt interrupt;
   int signal = 0;
-  const AccuracyFigures figures = measure(setup, signal);
+  const AccuracyFigures figures = measure(setup, interrupt, signal);
   bool written = true;
   if (!arguments.json.empty()) {
     written &= attempt([&] { write_json(arguments.json, accuracy_json(arguments, setup, figures)); });
@@ -72,20 +73,18 @@ int accuracy_command(const AccuracyArguments& arguments) {
   if (!arguments.plot.empty() && any) {
     written &= attempt([&] { plot::draw(arguments.plot, accuracy_charts(arguments, setup, figures)); });
   }
-  fmt::print("{}", accuracy_summary(arguments, setup, figures));
-  std::fflush(stdout);
+  say_text(accuracy_summary(arguments, setup, figures));
   if (signal != 0) {
-    fmt::print(stderr, "linden: interrupted after {}\n", counted(std::ranges::count_if(figures.rows, &AccuracyRow::done), "row"));
+    tell("interrupted after {}", counted(std::ranges::count_if(figures.rows, &AccuracyRow::done), "row"));
     return 128 + signal;
   }
   if (!figures.reference.failure.empty()) {
-    fmt::print(stderr,
-               "linden: there is nothing to judge by: {}; try a smaller --dt, a shorter --duration or a larger --budget\n",
-               printable(figures.reference.failure));
+    tell("there is nothing to judge by: {}; try a smaller --dt, a shorter --duration or a larger --budget",
+         figures.reference.failure);
     return 1;
   }
   if (!any) {
-    fmt::print(stderr, "linden: no run came to its end within the budget; try a shorter --duration or a larger --budget\n");
+    tell("no run came to its end within the budget; try a shorter --duration or a larger --budget");
     return 1;
   }
   return written ? 0 : 1;

@@ -17,6 +17,7 @@
 #include "engine/program/effect_cost.hpp"
 #include "engine/program/effects_text.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/step/sweep_cost.hpp"
 #include "engine/step/sweeps.hpp"
 #include "engine/text.hpp"
@@ -156,13 +157,13 @@ class Printer {
   }
   void left_out(std::size_t count) const {
     const auto rest = static_cast<std::int64_t>(count - shown(count));
-    if (rest > 0) fmt::print("  ... and {} more; --all prints them\n", grouped(rest));
+    if (rest > 0) say("  ... and {} more; --all prints them\n", grouped(rest));
   }
 
   void totals() const {
     const Tree& tree = model_.tree;
     const MassDistribution masses = mass_distribution(model_, model_.neutral());
-    const auto row = [](const char* label, const std::string& value) { fmt::print("{:<11} {}\n", label, value); };
+    const auto row = [](const char* label, const std::string& value) { say("{:<11} {}\n", label, value); };
     std::vector<std::string> kinds;
     for (const auto& [motion, count] : counts_of(bodies_)) kinds.push_back(fmt::format("{} {}", grouped(count), motion));
     row("model", printable(model_.names.model) + ", " + base_of(model_));
@@ -183,20 +184,20 @@ class Printer {
   void effects() const {
     if (!arguments_.scene) return;
     const Scene& scene = *arguments_.scene;
-    fmt::print("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
+    say("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
     const auto& g = arguments_.options.gravity;
-    if (g != std::array<double, 3>{0, 0, 0}) fmt::print("  {:<9} {:g} {:g} {:g} m/s^2\n", "gravity", g[0], g[1], g[2]);
+    if (g != std::array<double, 3>{0, 0, 0}) say("  {:<9} {:g} {:g} {:g} m/s^2\n", "gravity", g[0], g[1], g[2]);
     for (const EffectLine& line : effect_lines(scene.effects, model_)) {
-      fmt::print("  {:<9} {}, {}\n", line.name, line.where, line.what);
+      say("  {:<9} {}, {}\n", line.name, line.where, line.what);
     }
     const std::vector<EffectCost>& costs = costs_.effects;
-    fmt::print("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs.front().nanoseconds,
+    say("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs.front().nanoseconds,
                costs.back().nanoseconds);
-    for (std::size_t k = 1; k + 1 < costs.size(); ++k) fmt::print("  {:<9} {:+.0f} alone\n", costs[k].name, costs[k].nanoseconds);
+    for (std::size_t k = 1; k + 1 < costs.size(); ++k) say("  {:<9} {:+.0f} alone\n", costs[k].name, costs[k].nanoseconds);
   }
 
   void table() const {
-    fmt::print("\nbodies, parents first\n");
+    say("\nbodies, parents first\n");
     Table table({{"slot", Align::right},
                  {"body", Align::left},
                  {"parent", Align::left},
@@ -215,28 +216,28 @@ class Printer {
                  rows_text(body.first_v, velocity_count(body.kind)), fmt::format("{:.4g}", body.mass),
                  screw ? limits_text(body.lower, body.upper, body.motion != "prismatic") : "-"});
     }
-    fmt::print("{}", table.text("  "));
+    say_text(table.text("  "));
     left_out(bodies_.size());
   }
 
   void conventions() const {
-    fmt::print("\nrows of a joint\n");
+    say("\nrows of a joint\n");
     const auto has = [&](JointKind kind) {
       return std::ranges::any_of(model_.tree.runs, [&](const Run& run) { return run.kind == kind; });
     };
-    if (has(JointKind::screw)) fmt::print("  screw  q: angle [rad] (prismatic: shift [m]); v: its rate\n");
-    if (has(JointKind::ball)) fmt::print("  ball   q: unit quaternion x y z w; v: angular velocity x y z in the body's frame\n");
+    if (has(JointKind::screw)) say("  screw  q: angle [rad] (prismatic: shift [m]); v: its rate\n");
+    if (has(JointKind::ball)) say("  ball   q: unit quaternion x y z w; v: angular velocity x y z in the body's frame\n");
     if (has(JointKind::free)) {
-      fmt::print("  free   q: position x y z in the parent's frame, unit quaternion x y z w; v: angular x y z, then linear x y z, in the "
+      say("  free   q: position x y z in the parent's frame, unit quaternion x y z w; v: angular x y z, then linear x y z, in the "
                  "body's frame\n");
     }
-    fmt::print("  A quaternion turns body coordinates to the parent's. A body's frame sits at its joint, the axis of a screw along z.\n");
+    say("  A quaternion turns body coordinates to the parent's. A body's frame sits at its joint, the axis of a screw along z.\n");
   }
 
   void merged() const {
     const std::vector<MergedLink> links = merged_links(model_);
     if (links.empty()) return;
-    fmt::print("\nlinks behind fixed joints, merged into the body that carries them\n");
+    say("\nlinks behind fixed joints, merged into the body that carries them\n");
     const std::size_t count = shown(links.size());
     for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
       const Index slot = links[begin].slot;
@@ -244,30 +245,30 @@ class Printer {
       for (end = begin; end < count && links[end].slot == slot; ++end) {
         const std::string word = (end > begin ? ", " : " ") + printable(links[end].name);
         if (line.size() + word.size() > kLineWidth && end > begin) {
-          fmt::print("{},\n", line);
+          say("{},\n", line);
           line = "      " + printable(links[end].name);
         } else {
           line += word;
         }
       }
-      fmt::print("{}\n", line);
+      say("{}\n", line);
     }
     left_out(links.size());
   }
 
   void mimics() const {
     if (model_.mimics.empty()) return;
-    fmt::print("\nmimic joints\n");
+    say("\nmimic joints\n");
     const auto joint = [&](Index slot) { return printable(model_.names.joint[static_cast<std::size_t>(slot)]); };
     for (const Mimic& mimic : std::span(model_.mimics).first(shown(model_.mimics.size()))) {
-      fmt::print("  {} = {:g} x {}{}\n", joint(mimic.follower_slot), mimic.multiplier, joint(mimic.leader_slot),
+      say("  {} = {:g} x {}{}\n", joint(mimic.follower_slot), mimic.multiplier, joint(mimic.leader_slot),
                  mimic.offset == 0 ? "" : fmt::format(" {:+g}", mimic.offset));
     }
     left_out(model_.mimics.size());
   }
 
   void sweeps() const {
-    fmt::print("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
+    say("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
     Table table({{"when", Align::left}, {"sweep", Align::left}, {"ns/body", Align::right}, {"reads", Align::left}, {"writes", Align::left}},
                 kLineWidth);
     std::string_view before;
@@ -278,16 +279,16 @@ class Printer {
                  std::isfinite(cost) ? fmt::format("{:.2f}", cost) : "-", std::string(sweep.reads), std::string(sweep.writes)});
       before = sweep.when;
     }
-    fmt::print("{}", table.text("  "));
-    fmt::print("  evaluation: of the first guess and after every correction; factor: where that of an earlier step does not\n"
+    say_text(table.text("  "));
+    say("  evaluation: of the first guess and after every correction; factor: where that of an earlier step does not\n"
                "  serve, and again where a correction gains little.\n"
                "  ns/body: of each sweep alone on this machine, over the whole tree\n");
   }
 
   void warnings() const {
     if (model_.warnings.empty()) return;
-    fmt::print("\nwarnings\n");
-    for (const std::string& warning : model_.warnings) fmt::print("  {}\n", printable(warning));
+    say("\nwarnings\n");
+    for (const std::string& warning : model_.warnings) say("  {}\n", printable(warning));
   }
 
   const InspectArguments& arguments_;

@@ -1,6 +1,8 @@
 // engine/program/interrupt.hpp
-// Ctrl-C as a request: while an Interrupt lives, SIGINT and SIGTERM are noted, not obeyed. One that comes more than a second after the
-// first ends the program at once; sooner it is the same request twice, as `timeout` sends it to a process and to its group.
+// Ctrl-C as a request: while an Interrupt lives, SIGINT, SIGTERM and SIGHUP are noted, not obeyed, so that what was recorded is finished and
+// put in place, also while it is being packed. Further ones change nothing and are answered with a line (not within a second of the first,
+// when it is the same request twice, as `timeout` sends it to a process and to its group). SIGHUP that was ignored before, as by nohup,
+// stays ignored.
 #pragma once
 
 #include <csignal>
@@ -9,6 +11,7 @@ namespace linden {
 
 class Interrupt {
  public:
+  /// To be made before the first file that is to outlive an interrupt. There is one at a time.
   Interrupt();
   ~Interrupt();
   Interrupt(const Interrupt&) = delete;
@@ -21,7 +24,8 @@ class Interrupt {
   static void note(int signal);
   static volatile std::sig_atomic_t caught_;
 
-  struct sigaction before_int_ {}, before_term_ {};
+  static constexpr int kSignals[] = {SIGINT, SIGTERM, SIGHUP};
+  struct sigaction before_[3] {};
 };
 
 }  // namespace linden

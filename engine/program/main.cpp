@@ -1,7 +1,7 @@
 // engine/program/main.cpp
 // The program `linden`: commands, their options, and what becomes of mistakes.
 //
-//   exit codes  0 fine, 1 the run failed, 2 bad input, 130 interrupted
+//   exit codes  0 fine, 1 the run failed or an output was lost, 2 bad input, 128 + signal interrupted
 //   messages    one line on stderr that begins with "linden: "; results on stdout
 #include <fmt/format.h>
 
@@ -14,6 +14,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <type_traits>
 #include <vector>
 
@@ -24,6 +25,7 @@
 #include "engine/program/scaling_command.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_file.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
 #include "layout/words.hpp"
@@ -34,7 +36,7 @@ namespace {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      shape, dofs, steps, budget;
+      what, shape, dofs, steps, budget;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -94,28 +96,39 @@ void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
   read();
 }
 
+void read_order(const Texts& texts, Options& options) {
+  if (texts.order.empty()) return;
+  const std::int64_t order = integer_from("--order", texts.order, "2, 4, 6 or 8");
+  if (order < 2 || order > 8 || order % 2 != 0) throw InputError(fmt::format("--order {}: expected 2, 4, 6 or 8", order));
+  // a tolerance that nobody chose goes with the order
+  const bool chosen = !texts.tolerance.empty() || options.tolerance != default_tolerance(options.order);
+  options.order = static_cast<int>(order);
+  if (!chosen) use_default_tolerance(options);
+}
+
+template <class Arguments>
+void read_recording_options(const Texts& texts, Arguments& arguments) {
+  if (!texts.every.empty()) arguments.every = integer_from("--every", texts.every, "steps between frames, such as 10");
+  if (!texts.what.empty()) arguments.what = quantities_from(texts.what);
+}
+
 void read_run_options(const Texts& texts, RunArguments& run) {
   read_over_scene(run, run.options, [&] { read_motion_options(texts, run, run.options); });
   if (!run.load.empty() && randomness(run)) {
     throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
   }
+  read_recording_options(texts, run);
   if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
   if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
   if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
-  if (!texts.order.empty()) {
-    const std::int64_t order = integer_from("--order", texts.order, "2, 4, 6 or 8");
-    if (order < 2 || order > 8 || order % 2 != 0) throw InputError(fmt::format("--order {}: expected 2, 4, 6 or 8", order));
-    // a tolerance that nobody chose goes with the order
-    const bool chosen = !texts.tolerance.empty() || run.options.tolerance != default_tolerance(run.options.order);
-    run.options.order = static_cast<int>(order);
-    if (!chosen) use_default_tolerance(run.options);
-  }
+  read_order(texts, run.options);
 }
 
 void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
   read_over_scene(rollout, rollout.options, [&] { read_motion_options(texts, rollout, rollout.options); });
   if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
-  if (!texts.every.empty()) rollout.every = integer_from("--every", texts.every, "steps between frames, such as 10");
+  read_recording_options(texts, rollout);
+  read_order(texts, rollout.options);
   if (!texts.threads.empty()) {
     const std::int64_t threads = integer_from("--threads", texts.threads, "how many, such as 8; 0 for all there are");
     rollout.options.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
@@ -201,18 +214,24 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Method", "--stop", texts.stop, "NAME", "energy (default: relative) or absolute (|r| in N m s)");
   add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10, above order 2 less");
   add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
-  add("Output", "--record", run.record, "FILE.csv", "time, energy and all coordinates, one row a step");
+  add("Output", "--record", run.record, "FILE.csv|npz|h5", "time, energy and what --what says, one row a step");
+  add("Output", "--what", texts.what, "LIST", "what is recorded and plotted, with commas; see below");
+  add("Output", "--every", texts.every, "K", "record a row every K steps, default 1");
   add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
-  add("Output", "--plot", run.plot, "FILE.svg|png", "energy over time");
+  add("Output", "--plot", run.plot, "FILE.svg|png", "drift of energy over time, or what --what says");
   add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
   command->footer(
-      "Coordinates are named after their joints, a name that is taken with _2 behind it; quaternions are x y z w. Ctrl-C ends a run early\n"
-      "and keeps its files.\n"
+      "Coordinates are named after their joints, a name that is taken with _2 behind it; quaternions are x y z w. Ctrl-C, SIGTERM and\n"
+      "SIGHUP end a run early and keep its files; on a full disk it ends with what fits.\n"
       "What is given here goes over what a scene says.\n\n"
+      "--what takes positions, velocities, servos (the force of each), forces (of all effects on each coordinate), energies (kinetic,\n"
+      "potential, taken and given by each effect) and contacts (points and normal force of each body). Unless told otherwise a table has\n"
+      "positions, npz and h5 have positions and velocities, and a plot has the drift of energy. Forces are means over the step before.\n\n"
       "Examples:\n"
       "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"
       "  linden run models/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --plot energy.png\n"
-      "  linden run chain:100 --duration 5 --dt 1e-3 --record chain.csv --json chain.json");
+      "  linden run chain:100 --duration 5 --dt 1e-3 --record chain.csv --json chain.json\n"
+      "  linden run models/scenes/humanoid_drop.yaml --record drop.h5 --what positions,servos,contacts --every 10");
   return command;
 }
 
@@ -229,15 +248,17 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add.step(texts);
   add.gravity("Motion", texts);
   add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10; single precision stops at 3e-6");
+  add("Method", "--order", texts.order, "N", "of the integrator: 2 alone; run has 4, 6 and 8 too");
   command->add_flag("--float", rollout.single, "single precision: twice as fast, half the memory")->group("Method");
   add("Processor", "--threads", texts.threads, "T", "default: all there are; results do not depend on it");
   add("Processor", "--instructions", texts.instructions, "NAME", "scalar, baseline, avx2 or avx512; default: the best there is");
-  add("Output", "--record", rollout.record, "FILE.npz|h5", "time, q, v, energy and status of all instances");
+  add("Output", "--record", rollout.record, "FILE.npz|h5", "time, energy, status and what --what says, of all instances");
+  add("Output", "--what", texts.what, "LIST", "of positions, velocities (default: both) and energies");
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
   add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
   command->footer(
-      "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C ends a rollout early\n"
-      "and keeps its files.\n\n"
+      "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C, SIGTERM and SIGHUP end\n"
+      "a rollout early and keep its files; on a full disk it ends with what fits.\n\n"
       "Examples:\n"
       "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
       "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"
@@ -363,7 +384,7 @@ int run_program(int argc, char** argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    fmt::print("{}", with_single_gaps(program.help()));
+    say_text(with_single_gaps(program.help()));
     return 0;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
@@ -404,25 +425,37 @@ int run_program(int argc, char** argv) {
   throw InputError("no command given; choose run, rollout, accuracy, scaling or inspect; linden --help says more");
 }
 
+constexpr const char* kNoMemory = "there is not enough memory for that; choose a smaller model or fewer instances, or allow more (ulimit -v)";
+
 int complain(std::string_view message, int exit_code) {
-  fmt::print(stderr, "linden: {}\n", printable(message));
+  tell_text(message);
   return exit_code;
+}
+
+int guarded(int argc, char** argv) {
+  try {
+    return run_program(argc, argv);
+  } catch (const MemoryError& error) {
+    return complain(error.what(), 1);
+  } catch (const InputError& error) {
+    return complain(error.what(), 2);
+  } catch (const std::bad_alloc&) {
+    return complain(kNoMemory, 1);
+  } catch (const std::length_error&) {
+    return complain(kNoMemory, 1);
+  } catch (const std::exception& error) {
+    return complain(error.what(), 1);
+  }
 }
 
 }  // namespace
 }  // namespace linden
 
 int main(int argc, char** argv) {
-  using linden::complain;
-  try {
-    return linden::run_program(argc, argv);
-  } catch (const linden::InputError& error) {
-    return complain(error.what(), 2);
-  } catch (const std::bad_alloc&) {
-    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
-  } catch (const std::length_error&) {
-    return complain("the model does not fit in this machine's memory; choose a smaller one", 2);
-  } catch (const std::exception& error) {
-    return complain(error.what(), 1);
-  }
+  linden::prepare_standard_streams();
+  const int exit_code = linden::guarded(argc, argv);
+  const int lost = linden::flush_standard_output();
+  if (lost == 0) return exit_code;
+  linden::tell("standard output cannot be written: {}", std::generic_category().message(lost));
+  return exit_code != 0 ? exit_code : 1;
 }

@@ -4,8 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <string>
+
+#include "engine/standard_streams.hpp"
 
 namespace linden {
 namespace {
@@ -31,16 +32,14 @@ void Progress::draw(std::int64_t done, Clock::time_point now) {
   const double elapsed = seconds(now - begin_);
   const auto filled = static_cast<std::size_t>(share * kBarWidth);
   const std::string eta = done > 0 ? clock_text(elapsed * (1 - share) / share) : "?";
-  fmt::print(stderr, "\r\033[K{:3.0f} % [{:<{}}] {:.4g} of {:.4g} {}, {} left", 100 * share, std::string(filled, '#'), kBarWidth,
-             static_cast<double>(done) * step_, static_cast<double>(steps_) * step_, unit_, eta);
-  std::fflush(stderr);
+  show_text(fmt::format("\r\033[K{:3.0f} % [{:<{}}] {:.4g} of {:.4g} {}, {} left", 100 * share, std::string(filled, '#'), kBarWidth,
+                        static_cast<double>(done) * step_, static_cast<double>(steps_) * step_, unit_, eta));
   shown_ = true;
 }
 
 void Progress::erase() {
   if (!shown_) return;
-  fmt::print(stderr, "\r\033[K");
-  std::fflush(stderr);
+  show_text("\r\033[K");
   shown_ = false;
 }
 

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "engine/files/output_file.hpp"
@@ -17,6 +20,7 @@
 #include "engine/program/progress.hpp"
 #include "engine/program/rollout_report.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
 
@@ -28,6 +32,8 @@ using Clock = Progress::Clock;
 Outputs checked_outputs(const RolloutArguments& arguments) {
   if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
   if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
+  if (!arguments.what.empty() && arguments.record.empty()) throw InputError("--what says what --record takes: give a --record file too");
+  require_available(arguments.what, {Quantity::positions, Quantity::velocities, Quantity::energies}, "a rollout");
   return {{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
 }
 
@@ -62,21 +68,26 @@ class Execution {
     });
     figures_.bytes = batch_.bytes();
     if (!arguments.record.empty()) {
-      file_.emplace(arguments.record, batch_.model().names, arguments.instances);
-      const auto room = [&](Index rows) { return static_cast<std::size_t>(arguments.instances) * static_cast<std::size_t>(rows); };
-      q_.resize(room(batch_.model().tree.shape.positions));
-      v_.resize(room(batch_.model().tree.shape.velocities));
-      status_.resize(room(1));
+      what_ = arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what;
+      const Names& names = batch_.model().names;
+      std::vector<RecordedArray> arrays;
+      for (const Quantity quantity : what_) {
+        arrays.push_back(quantity == Quantity::positions    ? recorded_positions(names)
+                         : quantity == Quantity::velocities ? recorded_velocities(names)
+                                                            : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
+        numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
+      }
+      status_.resize(static_cast<std::size_t>(arguments.instances));
+      file_.emplace(arguments.record, arguments.instances, std::move(arrays));
     }
     energy_.resize(static_cast<std::size_t>(arguments.instances));
   }
 
-  void steps() {
-    const Interrupt interrupt;
+  void steps(const Interrupt& interrupt) {
     Progress progress(figures_.steps_planned, arguments_.options.step);
     std::int64_t stretch = 1;  // steps between two looks at the clock
     look();
-    while (figures_.steps < figures_.steps_planned && interrupt.signal() == 0) {
+    while (figures_.steps < figures_.steps_planned && figures_.lost.empty() && interrupt.signal() == 0) {
       std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
       if (file_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
       const Clock::time_point begin = Clock::now();
@@ -91,7 +102,7 @@ class Execution {
       progress.update(figures_.steps, now);
     }
     if (looked_at_ != figures_.steps) look();
-    if (figures_.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
+    if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
     finish();
   }
 
@@ -99,10 +110,13 @@ class Execution {
   bool write_files() {
     bool fine = true;
     if (file_) {
-      fine = attempt([&] {
+      const std::string before = figures_.lost;
+      recording([&] {
         file_->commit();
         figures_.frames = file_->frames();
       });
+      if (!before.empty()) figures_.lost = before;
+      fine = figures_.lost.empty();
     }
     if (!arguments_.json.empty()) {
       fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
@@ -113,6 +127,14 @@ class Execution {
   RolloutFigures& figures() { return figures_; }
 
  private:
+  void recording(const std::function<void()>& work) {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      figures_.lost = error.what();
+    }
+  }
+
   /// Energies of all instances, and a frame of the file.
   void look() {
     const auto seen = batch_.observe();
@@ -131,11 +153,16 @@ class Execution {
       if (first) figures_.first_energy[at] = total;
       figures_.most_kinetic[at] = std::max(figures_.most_kinetic[at], kinetic);
       if (!file_) continue;
-      std::ranges::copy(positions.instance(i), q_.begin() + i * positions.rows());
-      std::ranges::copy(velocities.instance(i), v_.begin() + i * velocities.rows());
+      for (std::size_t k = 0; k < what_.size(); ++k) {
+        const auto& from = what_[k] == Quantity::positions ? positions : what_[k] == Quantity::velocities ? velocities : energies;
+        std::ranges::copy(from.instance(i), numbers_[k].begin() + i * from.rows());
+      }
       status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
     }
-    if (file_) file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, q_, v_, energy_, status_);
+    if (file_ && figures_.lost.empty()) {
+      const std::vector<std::span<const Real>> arrays(numbers_.begin(), numbers_.end());
+      recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, arrays, energy_, status_); });
+    }
     looked_at_ = figures_.steps;
   }
 
@@ -155,7 +182,9 @@ class Execution {
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;
-  std::vector<Real> q_, v_, energy_;
+  std::vector<Quantity> what_;              // that is recorded
+  std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
+  std::vector<Real> energy_;
   std::vector<std::uint8_t> status_;
   std::int64_t looked_at_ = -1;
 };
@@ -163,20 +192,25 @@ class Execution {
 template <class Real>
 int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
   check_instances<Real>(arguments, model->tree.shape);
+  const Interrupt interrupt;
   Execution<Real> rollout(arguments, model, steps);
-  rollout.steps();
+  rollout.steps(interrupt);
   RolloutFigures& figures = rollout.figures();
   figures.total_seconds = seconds(Clock::now() - begin);
   const bool written = rollout.write_files();
-  fmt::print("{}", rollout_summary(arguments, *model, figures));
-  std::fflush(stdout);
+  say_text(rollout_summary(arguments, *model, figures));
   if (figures.signal != 0) {
-    fmt::print(stderr, "linden: interrupted after {} of {} steps{}\n", grouped(figures.steps), grouped(figures.steps_planned),
-               figures.frames > 0 ? printable(fmt::format("; {} is valid up to there", arguments.record)) : "");
+    tell("interrupted after {} of {} steps{}", grouped(figures.steps), grouped(figures.steps_planned),
+               figures.frames > 0 ? fmt::format("; {} is valid up to there", arguments.record) : "");
     return 128 + figures.signal;
   }
+  if (!figures.lost.empty()) {
+    tell("{}; {}; the rollout ended after {} of {} steps", figures.lost,
+         figures.frames > 0 ? fmt::format("it holds {}", counted(figures.frames, "frame")) : "no frame of it is kept", grouped(figures.steps),
+         grouped(figures.steps_planned));
+  }
   if (figures.summary.frozen > 0) {
-    fmt::print(stderr, "linden: {} of {} instances failed and were frozen at their last good state\n", grouped(figures.summary.frozen),
+    tell("{} of {} instances failed and were frozen at their last good state", grouped(figures.summary.frozen),
                grouped(arguments.instances));
   }
   return written && figures.summary.frozen == 0 ? 0 : 1;
@@ -190,6 +224,10 @@ int rollout_command(const RolloutArguments& given) {
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   const Outputs outputs = checked_outputs(arguments);
+  if (arguments.options.order != 2) {
+    throw InputError(fmt::format("--order {}: a rollout has order 2 alone; expected 2; give --order 2, or simulate one instance with linden run",
+                                 arguments.options.order));
+  }
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
   const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);

@@ -4,14 +4,17 @@
 //   start     instance i starts from random_state(seed + i, spread)
 //   steps     all instances, in stretches of some tenths of a second between which progress is shown and an interrupt heard
 //   fails     an instance whose step fails is frozen at its last good state; the others go on, and the exit code is 1
-//   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step.
+//   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step; where the recording
+//             finds no room it ends with the frames that did
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "engine/batch.hpp"
 #include "engine/program/motion_arguments.hpp"
+#include "engine/program/quantities.hpp"
 
 namespace linden {
 
@@ -21,10 +24,11 @@ struct RolloutArguments : MotionArguments {
   bool single = false;      // float instead of double
   std::int64_t every = 1;   // steps between recorded frames
   std::string record, json;  // files; empty = none
+  std::vector<Quantity> what;  // to record; empty: what is usual
 };
 
-/// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 130 after Ctrl-C. Throws InputError for bad
-/// input.
+/// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 128 + signal after one. Throws InputError
+/// for bad input.
 int rollout_command(const RolloutArguments& arguments);
 
 }  // namespace linden

@@ -140,6 +140,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"frames", figures.frames},
       {"failures", figures.summary.frozen},
       {"failure_texts", figures.failures},
+      {"recording_failure", figures.lost.empty() ? Json(nullptr) : Json(figures.lost)},
       {"interrupted", figures.signal != 0},
       {"warnings", model.warnings},
   };

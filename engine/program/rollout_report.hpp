@@ -21,6 +21,7 @@ struct RolloutFigures {
   std::vector<std::string> failures;                            // the first few, one sentence each
   int signal = 0;                                               // that ended the rollout
   std::int64_t frames = 0;                                      // recorded
+  std::string lost;                                             // why the recording ended early, and the rollout with it
 
   double steps_per_second() const { return static_cast<double>(summary.steps) / step_seconds; }
 };

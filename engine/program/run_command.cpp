@@ -8,17 +8,19 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string_view>
 #include <vector>
 
 #include "engine/files/output_file.hpp"
-#include "engine/files/recorder.hpp"
 #include "engine/files/report_files.hpp"
+#include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 
 namespace linden {
@@ -37,7 +39,12 @@ bool holds_something_else(const std::string& file) {
 
 /// Every file that is to be written can be.
 Outputs checked_outputs(const RunArguments& arguments) {
-  Outputs outputs{{"--record", arguments.record, {".csv"}},
+  if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between rows", arguments.every));
+  if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
+  if (!arguments.what.empty() && arguments.record.empty() && arguments.plot.empty()) {
+    throw InputError("--what says what --record and --plot take: give one of them too");
+  }
+  Outputs outputs{{"--record", arguments.record, {".csv", ".npz", ".h5"}},
                   {"--json", arguments.json, {".json"}},
                   {"--plot", arguments.plot, {".svg", ".png"}},
                   {"--save", arguments.save, {}}};
@@ -70,15 +77,18 @@ class Execution {
     figures_.begin = simulation.time();
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
     if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
-    if (!arguments.record.empty()) recorder_.emplace(arguments.record, simulation.model().names);
+    if (!arguments.record.empty()) {
+      observer_.emplace(simulation, arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what);
+      file_.emplace(arguments.record, 1, observer_->arrays());
+    }
+    if (!arguments.plot.empty() && !arguments.what.empty()) begin_traces();
   }
 
-  void steps() {
-    const Interrupt interrupt;
+  void steps(const Interrupt& interrupt) {
     Progress progress(figures_.steps_planned, simulation_.options().step);
     std::int64_t chunk = 1;  // steps between two looks at the clock
     sample();
-    while (figures_.run.steps < figures_.steps_planned && figures_.failure.empty() && interrupt.signal() == 0) {
+    while (figures_.run.steps < figures_.steps_planned && figures_.failure.empty() && figures_.lost.empty() && interrupt.signal() == 0) {
       const std::int64_t end = std::min({figures_.steps_planned, figures_.run.steps + chunk, next_sample_});
       const Clock::time_point begin = Clock::now();
       figures_.run.add(simulation_.run(end - figures_.run.steps));
@@ -92,7 +102,8 @@ class Execution {
       progress.update(figures_.run.steps, now);
     }
     if (last_sample_ != figures_.run.steps) sample();
-    if (figures_.run.steps < figures_.steps_planned) figures_.signal = interrupt.signal();
+    if (last_record_ != figures_.run.steps) record(simulation_.energy());
+    if (figures_.run.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
   }
 
   /// Everything that was asked for. Complaints go to stderr; true where there were none.
@@ -106,9 +117,13 @@ class Execution {
         fine = false;
       }
     };
-    write(arguments_.record, [&] { recorder_->commit(); });
+    if (file_) {
+      keep_recording();
+      if (figures_.rows > 0) written_.push_back(arguments_.record);
+      fine = figures_.lost.empty();
+    }
     write(arguments_.save, [&] { simulation_.save(arguments_.save); });
-    write(arguments_.plot, [&] { plot::draw(arguments_.plot, energy_chart(arguments_, simulation_, figures_)); });
+    write(arguments_.plot, [&] { plot::draw(arguments_.plot, run_charts(arguments_, simulation_, figures_)); });
     write(arguments_.json, [&] { write_json(arguments_.json, run_json(arguments_, simulation_, figures_)); });
     return fine;
   }
@@ -117,33 +132,77 @@ class Execution {
   const std::vector<std::string>& written() const { return written_; }
 
  private:
+  void recording(const std::function<void()>& work) {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      figures_.lost = error.what();
+    }
+  }
+
+  /// Rows that were recorded before the disk was full are kept.
+  void keep_recording() {
+    const std::string before = figures_.lost;
+    recording([&] { file_->commit(); });
+    if (!before.empty()) figures_.lost = before;
+    figures_.rows = file_->frames();
+  }
+
+  void begin_traces() {
+    if (!observer_) observer_.emplace(simulation_, arguments_.what);
+    constexpr std::size_t kMostRows = 64;  // kept; what is drawn of them says run_charts
+    for (std::size_t k = 0; k < observer_->arrays().size(); ++k) {
+      const RecordedArray& array = observer_->arrays()[k];
+      QuantityTrace& trace = figures_.traces.emplace_back(QuantityTrace{observer_->quantity_of_array()[k], array.name, array.rows, array.rows.size(), {}});
+      trace.rows.resize(std::min(kMostRows, trace.all));
+      trace.points.resize(trace.rows.size());
+    }
+  }
+
+  void record(const Energy& energy) {
+    if (!file_ || !figures_.lost.empty()) return;
+    const double total = energy.total();
+    const auto status = static_cast<std::uint8_t>(figures_.run.last.status);
+    recording([&] { file_->add(simulation_.time(), observer_->look(), {&total, 1}, {&status, 1}); });
+    last_record_ = figures_.run.steps;
+  }
+
   void sample() {
     const Energy energy = simulation_.energy();
     figures_.taken = simulation_.effect_work().taken();
     figures_.given = simulation_.effect_work().given();
     figures_.energy.add(simulation_.time(), energy, figures_.taken, figures_.given);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
-    if (recorder_) recorder_->add(simulation_.time(), energy.total(), simulation_.positions());
-    // what effects took is still in the account, what they gave is not
-    if (!arguments_.plot.empty()) trace({simulation_.time(), energy.total() + figures_.taken - figures_.given - figures_.energy.initial()});
+    if (figures_.run.steps % arguments_.every == 0) record(energy);
+    if (!figures_.traces.empty()) {
+      const auto numbers = observer_->look();
+      for (std::size_t k = 0; k < figures_.traces.size(); ++k) {
+        std::vector<std::vector<plot::Point>>& rows = figures_.traces[k].points;
+        for (std::size_t row = 0; row < rows.size(); ++row) trace(rows[row], {simulation_.time(), numbers[k][row]});
+      }
+    } else if (!arguments_.plot.empty()) {
+      // what effects took is still in the account, what they gave is not
+      trace(figures_.trace, {simulation_.time(), energy.total() + figures_.taken - figures_.given - figures_.energy.initial()});
+    }
     last_sample_ = figures_.run.steps;
     next_sample_ = figures_.run.steps + figures_.sampled_every;
   }
 
-  void trace(plot::Point point) {
+  void trace(std::vector<plot::Point>& points, plot::Point point) const {
     // the picture is some 640 columns wide: of the samples in one 4,000th of the run only the extremes can be seen
     constexpr std::size_t kMostPoints = 1 << 16;
     constexpr double kColumns = 4000;
-    figures_.trace.push_back(point);
-    if (figures_.trace.size() < kMostPoints) return;
-    figures_.trace = plot::thinned(figures_.trace, static_cast<double>(figures_.steps_planned) * simulation_.options().step / kColumns);
+    points.push_back(point);
+    if (points.size() < kMostPoints) return;
+    points = plot::thinned(points, static_cast<double>(figures_.steps_planned) * simulation_.options().step / kColumns);
   }
 
   const RunArguments& arguments_;
   Simulation& simulation_;
   RunFigures figures_;
-  std::optional<Recorder> recorder_;
-  std::int64_t last_sample_ = -1, next_sample_ = 0;
+  std::optional<Observer> observer_;  // of what is recorded or plotted
+  std::optional<RolloutFile<double>> file_;
+  std::int64_t last_sample_ = -1, last_record_ = -1, next_sample_ = 0;
   std::vector<std::string> written_;
 };
 
@@ -155,6 +214,12 @@ std::string ending(const Execution& run, const RunFigures& figures, const Option
                                                                      run.written().size() == 1 ? "is" : "are");
   if (figures.signal != 0) {
     return fmt::format("interrupted at {:.6g} s, after {} of {} steps{}", time, grouped(done), grouped(figures.steps_planned), files);
+  }
+  if (figures.failure.empty()) {
+    const std::string kept = figures.rows > 0 ? fmt::format("it holds {}", counted(figures.rows, "row"))
+                                              : "no row of it is kept";
+    return fmt::format("{}; {}; the run ended at {:.6g} s, after {} of {} steps", figures.lost, kept, time, grouped(done),
+                       grouped(figures.steps_planned));
   }
   return fmt::format("the run failed in step {} of {}: {}; the last good state is that at {:.6g} s{}", grouped(done + 1),
                      grouped(figures.steps_planned), figures.failure, time, files);
@@ -173,15 +238,15 @@ int run_command(const RunArguments& arguments) {
   Simulation simulation(model, arguments.options, arguments.effects());
   begin_run(arguments, simulation);
 
+  const Interrupt interrupt;
   Execution run(arguments, simulation, steps);
-  run.steps();
+  run.steps(interrupt);
   RunFigures& figures = run.figures();
   figures.total_seconds = seconds(Clock::now() - begin);
   const bool written = run.write_files();
-  fmt::print("{}", run_summary(arguments, simulation, figures));
-  std::fflush(stdout);
-  for (const std::string& warning : energy_warnings(simulation, figures.energy)) fmt::print(stderr, "linden: warning: {}\n", printable(warning));
-  if (!figures.complete()) fmt::print(stderr, "linden: {}\n", printable(ending(run, figures, arguments.options)));
+  say_text(run_summary(arguments, simulation, figures));
+  for (const std::string& warning : energy_warnings(simulation, figures.energy)) tell("warning: {}", warning);
+  if (!figures.complete()) tell_text(ending(run, figures, arguments.options));
   return figures.signal != 0 ? 128 + figures.signal : written && figures.complete() ? 0 : 1;
 }
 

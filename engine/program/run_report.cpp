@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "engine/program/effects_text.hpp"
 #include "engine/scene/load_model.hpp"
@@ -126,7 +128,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   const auto written = [&](const std::string& file, const std::string& what) {
     if (!file.empty()) row("", printable(fmt::format("{}: {}", file, what)));
   };
-  written(arguments.record, fmt::format("{} rows", grouped(energy.samples())));
+  written(arguments.record, fmt::format("{} rows", grouped(figures.rows)));
   return text;
 }
 
@@ -209,11 +211,14 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
                                               : Json("P - m g t, and angular momentum along gravity")},
       {"failures", figures.failure.empty() ? 0 : 1},
       {"failure", if_given(figures.failure)},
+      {"recording_failure", if_given(figures.lost)},
       {"interrupted", figures.signal != 0},
       {"advice", if_given(fmt::format("{}", fmt::join(energy_warnings(simulation, energy), "; ")))},
       {"warnings", model.warnings},
   };
 }
+
+namespace {
 
 plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
   const Options& options = simulation.options();
@@ -237,6 +242,61 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
                          : fmt::format("{} [J]", drift);
   chart.series.push_back(std::move(curve));
   return chart;
+}
+
+/// With its unit; of a quantity of several kinds of joints there are two.
+std::string axis_label(const QuantityTrace& trace) {
+  switch (trace.quantity) {
+    case Quantity::positions: return "positions [rad, m]";
+    case Quantity::velocities: return "velocities [rad/s, m/s]";
+    case Quantity::servos: return "forces of servos [N m, N]";
+    case Quantity::forces: return "forces of effects [N m, N]";
+    case Quantity::energies: return "energies [J]";
+    case Quantity::contacts: break;
+  }
+  return trace.array == "contacts" ? "contact points that push" : "normal forces [N]";
+}
+
+/// Those of the rows that vary most, as many as can be told apart, in their order.
+std::vector<std::size_t> drawn_rows(const QuantityTrace& trace) {
+  constexpr std::size_t kMostDrawn = 12;
+  std::vector<std::size_t> rows(trace.rows.size());
+  std::iota(rows.begin(), rows.end(), std::size_t{0});
+  if (rows.size() <= kMostDrawn) return rows;
+  std::vector<double> range;
+  for (const std::vector<plot::Point>& points : trace.points) {
+    const auto [least, most] = std::ranges::minmax(points, {}, &plot::Point::y);
+    range.push_back(most.y - least.y);
+  }
+  std::ranges::stable_sort(rows, std::greater(), [&](std::size_t row) { return range[row]; });
+  rows.resize(kMostDrawn);
+  std::ranges::sort(rows);
+  return rows;
+}
+
+}  // namespace
+
+std::vector<plot::Chart> run_charts(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
+  if (figures.traces.empty()) return {energy_chart(arguments, simulation, figures)};
+  std::vector<plot::Chart> charts;
+  for (const QuantityTrace& trace : figures.traces) {
+    plot::Chart& chart = charts.emplace_back();
+    const std::vector<std::size_t> rows = drawn_rows(trace);
+    chart.title = fmt::format("{} of {}", axis_label(trace).substr(0, axis_label(trace).find(" [")), printable(simulation.model().names.model));
+    if (rows.size() < trace.all) {
+      chart.subtitle = fmt::format("the {} that vary most of {}{}", rows.size(), trace.rows.size() < trace.all ? "the first " : "", trace.rows.size());
+    }
+    chart.x.label = "time [s]";
+    chart.y.label = axis_label(trace);
+    for (const std::size_t k : rows) {
+      plot::Series& series = chart.series.emplace_back(plot::Series{.label = printable(trace.rows[k]), .x = {}, .y = {}});
+      for (const plot::Point& point : trace.points[k]) {
+        series.x.push_back(point.x);
+        series.y.push_back(point.y);
+      }
+    }
+  }
+  return charts;
 }
 
 }  // namespace linden

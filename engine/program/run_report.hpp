@@ -14,6 +14,15 @@
 
 namespace linden {
 
+/// Rows of an array over time, the first few.
+struct QuantityTrace {
+  Quantity quantity;
+  std::string array;
+  std::vector<std::string> rows;                 // their names
+  std::size_t all = 0;                           // rows that there are
+  std::vector<std::vector<plot::Point>> points;  // of each
+};
+
 /// Counted while a run goes on.
 struct RunFigures {
   std::int64_t steps_planned = 0;
@@ -26,10 +35,13 @@ struct RunFigures {
   double taken = 0, given = 0;  // by effects since the first sample [J]
   std::optional<MomentumDrift> momentum;
   std::vector<plot::Point> trace;  // drift of that energy [J] over time, for the picture
+  std::vector<QuantityTrace> traces;  // of what is to be plotted in its place
   std::string failure;             // what Simulation::describe says of the step that failed
   int signal = 0;                  // that ended the run
+  std::int64_t rows = 0;           // of the recording
+  std::string lost;                // why the recording ended early, and the run with it
 
-  bool complete() const { return failure.empty() && signal == 0; }
+  bool complete() const { return failure.empty() && signal == 0 && lost.empty(); }
   double simulated(double step) const { return static_cast<double>(run.steps) * step; }
 };
 
@@ -39,6 +51,7 @@ std::vector<std::string> energy_warnings(const Simulation& simulation, const Ene
 
 std::string run_summary(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
 nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
-plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
+/// What is plotted: the drift of energy, or what was asked for, a panel each.
+std::vector<plot::Chart> run_charts(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures);
 
 }  // namespace linden

@@ -20,6 +20,7 @@
 #include "engine/program/scaling_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/simulation.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "layout/input_error.hpp"
 #include "layout/words.hpp"
@@ -146,10 +147,9 @@ class Measurement {
   bool interrupted_ = false;
 };
 
-ScalingFigures measure(const ScalingArguments& arguments, const std::vector<std::string>& models) {
+ScalingFigures measure(const ScalingArguments& arguments, const std::vector<std::string>& models, const Interrupt& interrupt) {
   ScalingFigures figures;
   figures.rows_planned = models.size() * arguments.solvers.size();
-  const Interrupt interrupt;
   Progress progress(static_cast<std::int64_t>(figures.rows_planned), 1, "rows");
   const auto go_on = [&] {
     progress.update(static_cast<std::int64_t>(figures.rows.size()), Clock::now());
@@ -226,12 +226,12 @@ int scaling_command(const ScalingArguments& arguments) {
   check_arguments(arguments);
   const std::vector<std::string> models = models_of(arguments.shape, arguments.sizes);
   check_memory(models.back());
-  const ScalingFigures figures = measure(arguments, models);
+  const Interrupt interrupt;
+  const ScalingFigures figures = measure(arguments, models, interrupt);
   const bool written = write_files(arguments, figures);
-  fmt::print("{}", scaling_summary(arguments, figures));
-  std::fflush(stdout);
+  say_text(scaling_summary(arguments, figures));
   if (figures.signal != 0) {
-    fmt::print(stderr, "linden: interrupted after {} of {} rows\n", figures.rows.size(), figures.rows_planned);
+    tell("interrupted after {} of {} rows", figures.rows.size(), figures.rows_planned);
     return 128 + figures.signal;
   }
   const auto lost = [&](Solver solver) {
@@ -239,7 +239,7 @@ int scaling_command(const ScalingArguments& arguments) {
   };
   const auto failed = std::ranges::find_if(arguments.solvers, lost);
   if (failed == arguments.solvers.end()) return written ? 0 : 1;
-  fmt::print(stderr, "linden: {} failed at every size\n", name(*failed));
+  tell("{} failed at every size", name(*failed));
   return 1;
 }
 

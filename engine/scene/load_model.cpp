@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "engine/scene/scene_file.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "models/generators.hpp"
 
@@ -34,10 +35,10 @@ void require_memory(const std::string& what, double bytes) {
   const double present = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
   if (present <= 0 || bytes <= present) return;
   constexpr double kMost = 1e18;
-  throw InputError(fmt::format("{} {} about {} of memory; expected no more than the {} of this machine; choose fewer or a smaller one", what,
-                               what.find(' ') == what.npos ? "needs" : "need",
-                               memory_text(static_cast<std::size_t>(std::min(bytes, kMost))),
-                               memory_text(static_cast<std::size_t>(present))));
+  throw MemoryError(fmt::format("{} {} about {} of memory; expected no more than the {} of this machine; choose fewer or a smaller one", what,
+                                what.find(' ') == what.npos ? "needs" : "need",
+                                memory_text(static_cast<std::size_t>(std::min(bytes, kMost))),
+                                memory_text(static_cast<std::size_t>(present))));
 }
 
 double memory_of(const std::string& name) {
@@ -78,10 +79,10 @@ std::string base_of(const Model& model) {
 void print_warnings(const Model& model) {
   constexpr std::size_t kShown = 5;
   for (std::size_t i = 0; i < std::min(kShown, model.warnings.size()); ++i) {
-    fmt::print(stderr, "linden: warning: {}\n", printable(model.warnings[i]));
+    tell("warning: {}", model.warnings[i]);
   }
   if (model.warnings.size() > kShown) {
-    fmt::print(stderr, "linden: warning: and {} more (linden inspect shows all)\n", model.warnings.size() - kShown);
+    tell("warning: and {} more (linden inspect shows all)", model.warnings.size() - kShown);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "layout/input_error.hpp"
 #include "layout/urdf.hpp"
 
 namespace linden {
@@ -13,13 +14,19 @@ namespace linden {
 /// given); throws InputError where it is given for a generated model, for a scene, and for whatever cannot be read.
 Model load_model(const std::string& name, std::optional<Base> base);
 
-/// Throws InputError where `what` needs more bytes than the machine has: asked for too much, Linux ends programs without a word.
+/// More memory is asked for than there is.
+class MemoryError : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+/// Throws MemoryError where `what` needs more bytes than the machine has: asked for too much, Linux ends programs without a word.
 void require_memory(const std::string& what, double bytes);
 
 /// What a generated model takes to build and to simulate [bytes]; 0 where its name holds no number.
 double memory_of(const std::string& name);
 
-/// Throws InputError where the machine has less than that.
+/// Throws MemoryError where the machine has less than that.
 void check_memory(const std::string& name);
 
 /// "fixed" or "floating"; throws InputError for anything else.

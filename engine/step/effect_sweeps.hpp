@@ -418,6 +418,11 @@ class EffectSweeps {
     std::ranges::fill(bend_.flat(), S(kAnyBend));
   }
   const Limits<S>& limits() const { return limits_; }
+  /// What acts in the step that was solved last, until it is ended (engine/step/step_impulses.hpp).
+  const Servos<S>& servos() const { return servos_; }
+  const GroundPoints<S>& points() const { return points_; }
+  /// Of the ground, at the end of the last step [J].
+  S ground_potential() const { return ground_potential_; }
   /// The state is another's from now on.
   void forget() {
     const auto clear = [](auto& field) { std::ranges::fill(field.flat(), S(0.0)); };

@@ -13,6 +13,7 @@
 #include "engine/options.hpp"
 #include "engine/step/effect_plan.hpp"
 #include "engine/step/effect_work.hpp"
+#include "engine/step/step_impulses.hpp"
 #include "engine/step_report.hpp"
 #include "kernels/spatial.hpp"
 #include "layout/state.hpp"
@@ -22,7 +23,9 @@ namespace linden {
 struct Energy {
   double kinetic = 0;    // 1/2 p.M^-1 p [J]
   double potential = 0;  // of gravity (zero where the centre of mass is at the height of the world's origin), springs and ground [J]
+  double springs = 0, ground = 0;  // their shares of it
   double total() const { return kinetic + potential; }
+  double gravity() const { return potential - springs - ground; }
 };
 
 /// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading).
@@ -50,6 +53,10 @@ class Stepper {
   virtual StepReport step(State<double>& state, int& history, double time, double h, bool another) = 0;
   /// Of effects, in the step taken last.
   virtual const EffectAccount& effect_account() const = 0;
+
+  /// From now on the impulses of effects in a step are kept, as those of the step taken last; without effects there are none.
+  virtual void keep_impulses() = 0;
+  virtual const StepImpulses& impulses() const = 0;
 
   /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; NaN: that of the servo's table. Empty
   /// without servos.

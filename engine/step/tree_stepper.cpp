@@ -61,7 +61,7 @@ template <bool kEffects>
 StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h, bool another) {
   StepReport report;
   time_ = time;
-  account_ = {};
+  clear_account();
   bool changes = false;  // before a solve fails: parts of the step are taken, or a start is struck at its limits
   if constexpr (kEffects) {
     changes = effects_.plan().bounces || (state.last_step(0) == 0 && !effects_.plan().effects.limits.empty());
@@ -102,7 +102,7 @@ void TreeStepper<kEffects>::keep(const State<double>& state) {
 template <bool kEffects>
 void TreeStepper<kEffects>::restore(State<double>& state) {
   state = last_good_;
-  account_ = {};
+  clear_account();
   if constexpr (kEffects) {
     auto next = last_memory_.begin();
     for (const std::span<double> numbers : effects_.memory()) {
@@ -259,6 +259,26 @@ template <bool kEffects>
 std::span<double> TreeStepper<kEffects>::friction_forces() {
   if constexpr (kEffects) return effects_.friction_forces().flat();
   return {};
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::clear_account() {
+  account_ = {};
+  if constexpr (kEffects) {
+    if (impulses_.kept()) impulses_.clear();
+  }
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::keep_impulses() {
+  if constexpr (kEffects) impulses_.allocate(effects_.plan(), model_.tree.shape);
+}
+
+template <bool kEffects>
+const StepImpulses& TreeStepper<kEffects>::impulses() const {
+  static const StepImpulses none;
+  if constexpr (kEffects) return impulses_.sum();
+  return none;
 }
 
 template <bool kEffects>
@@ -527,6 +547,9 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   EffectAccount part;
   if constexpr (kEffects) {
     part = effects_.account(sweeps_.left(), work_.delta, before_, state.last_step(0) == h);
+    if (impulses_.kept()) {
+      impulses_.add(effects_, model_, h, state.q, work_.placement, work_.motion, work_.delta, sweeps_.left());
+    }
     if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
@@ -579,6 +602,10 @@ Energy TreeStepper<kEffects>::energy_of(const State<double>& state, Field<double
   double kinetic = 0;
   for (Index row = 0; row < rate.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
   within_bend(state, rate);
+  if constexpr (kEffects) {
+    const double ground = effects_.ground_potential();
+    return {kinetic, sweeps_.potential(), sweeps_.effect_potential() - ground, ground};
+  }
   return {kinetic, sweeps_.potential()};
 }
 

@@ -22,6 +22,7 @@
 
 #include "engine/step/blows.hpp"
 #include "engine/step/held_factor.hpp"
+#include "engine/step/impulse_account.hpp"
 #include "engine/step/stepper.hpp"
 #include "engine/step/tree_sweeps.hpp"
 
@@ -38,6 +39,8 @@ class TreeStepper final : public Stepper {
   void forget() override;
   StepReport step(State<double>& state, int& history, double time, double h, bool another) override;
   const EffectAccount& effect_account() const override { return account_; }
+  void keep_impulses() override;
+  const StepImpulses& impulses() const override;
   std::span<double> servo_targets() override;
   std::span<double> friction_forces() override;
   EffectMemory effect_memory() override;
@@ -69,6 +72,7 @@ class TreeStepper final : public Stepper {
     requires kEffects;
   bool strike(State<double>& state, double h, bool arrived, StepReport& report)
     requires kEffects;
+  void clear_account();
   void keep(const State<double>& state);
   void restore(State<double>& state);
   StepStatus solve(State<double>& state, int history, double h, StepReport& report);
@@ -89,6 +93,7 @@ class TreeStepper final : public Stepper {
   double failed_residual_ = 0;  // of the last solve that failed
   double mean_kinetic_ = 0;  // of the mean motion of the root found last [J]
   EffectAccount account_;    // of the whole step
+  [[no_unique_address]] std::conditional_t<kEffects, ImpulseAccount, NoImpulses> impulses_;  // likewise, where somebody asks
   Field<double> before_;             // see know_before
   Field<double> before_innovation_;  // of approach_softly
   HeldFactor held_;

@@ -50,12 +50,12 @@ class Shell : public Folder {
   }
 };
 
-/// Exit code 2, one line on stderr that says `expected`, nothing on stdout, and no file but those that were there.
-inline void check_refused(const Shell& shell, const std::string& arguments, const std::string& expected) {
+/// Exit code 2, or another, one line on stderr that says `expected`, nothing on stdout, and no file but those that were there.
+inline void check_refused(const Shell& shell, const std::string& arguments, const std::string& expected, int exit_code = 2) {
   INFO(arguments);
   const std::set<std::string> before = shell.files();
   const Outcome outcome = shell.linden(arguments);
-  CHECK(outcome.exit_code == 2);
+  CHECK(outcome.exit_code == exit_code);
   CHECK_THAT(outcome.err, StartsWith("linden: ") && Contains(expected));
   CHECK(std::ranges::count(outcome.err, '\n') == 1);
   CHECK(outcome.err.ends_with('\n'));

@@ -288,7 +288,7 @@ TEST_CASE("models that cannot be simulated are refused with the place of the mis
     check_refused(shell, to + "nan.urdf", "nan");
     check_refused(shell, to + ".", "folder");
     check_refused(shell, to + "chain:0", "no number of bodies");
-    check_refused(shell, to + "chain:999999999999", "memory");
+    check_refused(shell, to + "chain:999999999999", "memory", 1);
     check_refused(shell, to + "chian:3", "cannot be generated");
   }
 }

@@ -686,7 +686,51 @@ TEST_CASE("a run of effects that goes on from a checkpoint is the run that went 
   CHECK(std::ranges::equal(one.momenta(), other.momenta()));
   CHECK(one.velocities() == other.velocities());
   Simulation without(scene.model, scene.options);
-  CHECK_THROWS_WITH(without.load(folder.file("a.checkpoint")), Catch::Contains("other effects"));
+  CHECK_THROWS_WITH(without.load(folder.file("a.checkpoint")), Catch::Contains("was saved with ") && Catch::Contains("the simulation has no "));
+}
+
+TEST_CASE("a checkpoint names the joints and bodies that its effects act on, and is refused by others", "[effects]") {
+  const Folder folder;
+  const Model model = chain(4);
+  const std::string file = folder.file("a.checkpoint");
+  const auto load = [&](const Effects& saved, const Effects& here) {
+    Simulation one(model, {}, saved), other(model, {}, here);
+    run(one, 5);
+    one.save(file);
+    try {
+      other.load(file);
+      return std::string("loaded");
+    } catch (const InputError& error) {
+      CHECK(other.steps() == 0);
+      const std::string text = error.what();
+      return text.substr(0, text.find(", so it would"));
+    }
+  };
+  const std::string begin = file + ": this checkpoint was saved with ";
+  Effects one, other;
+  one.limits = {{.row = 0, .lower = -1, .upper = 1}};
+  other.limits = {{.row = 1, .lower = -1, .upper = 1}};
+  CHECK(load(one, other) == begin + "limits on joint1, the simulation has limits on joint2");
+  // other numbers are a choice
+  other = one;
+  other.limits[0].upper = 0.5;
+  CHECK(load(one, other) == "loaded");
+  // the first kind that differs, what both have left out
+  for (Index row = 1; row < 4; ++row) other.limits.push_back({.row = row, .lower = -1, .upper = 1});
+  CHECK(load(other, one) == begin + "limits on joint2, joint3, joint4, the simulation has no more limits");
+  CHECK(load(one, other) == begin + "no more limits, the simulation has limits on joint2, joint3, joint4");
+  other = one;
+  other.damping = {{.row = 2, .coefficient = 0.1}};
+  CHECK(load(one, other) == begin + "no damping, the simulation has damping on joint3");
+  CHECK(load(other, one) == begin + "damping on joint3, the simulation has no damping");
+  // what servos remember goes by their order
+  one.servos = {{.row = 0, .stiffness = 1}, {.row = 1, .stiffness = 1}};
+  other = one;
+  std::swap(other.servos[0], other.servos[1]);
+  CHECK(load(one, other) == begin + "servos on joint1, joint2, the simulation has servos on joint2, joint1, in another order");
+  other = one;
+  other.servos[0].stiffness = 2;
+  CHECK(load(one, other) == "loaded");
 }
 
 TEST_CASE("conservative effects leave no slope in the energy over 100,000 steps, damping's account closes", "[effects]") {

@@ -28,14 +28,19 @@ struct Instead {
   ~Instead() { on_fsync = nullptr; }
 };
 
-TEST_CASE("all of an output is on the disk before the old file is replaced") {
+TEST_CASE("all of an output is on the disk before the old file is replaced, and its name when all is done") {
   const Folder folder;
   folder.write("a", "old");
-  std::string seen;
+  std::string seen, seen_last;
   long written = 0;
   const Instead look([&](int file) {
     struct stat status {};
     REQUIRE(::fstat(file, &status) == 0);
+    if (S_ISDIR(status.st_mode)) {
+      seen_last = text_of(folder / "a");
+      return 0;
+    }
+    CHECK(seen_last.empty());
     written = status.st_size;
     seen = text_of(folder / "a");
     return 0;
@@ -43,6 +48,7 @@ TEST_CASE("all of an output is on the disk before the old file is replaced") {
   write_file(folder.file("a"), "something new");
   CHECK(seen == "old");
   CHECK(written == 13);
+  CHECK(seen_last == "something new");
   CHECK(text_of(folder / "a") == "something new");
   CHECK(folder.files() == std::set<std::string>{"a"});
 }

@@ -104,11 +104,15 @@ TEST_CASE("single precision and mimic joints say what they cost", "[command line
   CHECK_THAT(hand.out, Contains("mimic joints"));
 }
 
+TEST_CASE("more instances than the machine has memory for end in one line before they are made", "[command line]") {
+  const Shell shell;
+  check_refused(shell, "rollout chain:1000 --instances 900000000", "900,000,000 instances of chain:1000 need about", 1);
+}
+
 TEST_CASE("what a rollout cannot be is refused in one line", "[command line]") {
   const Shell shell;
   check_refused(shell, "rollout chain:3 --instances 0", "0 instances");
   check_refused(shell, "rollout chain:3 --instances many", "--instances");
-  check_refused(shell, "rollout chain:1000 --instances 900000000", "900,000,000 instances of chain:1000 need about");
   check_refused(shell, "rollout chain:3 --threads -2", "threads");
   check_refused(shell, "rollout chain:3 --instructions sse9", "choose one of: scalar");
   check_refused(shell, "rollout chain:3 --record a.csv", ".npz or .h5");

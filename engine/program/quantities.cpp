@@ -1,0 +1,177 @@
+#include "engine/program/quantities.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <string_view>
+
+#include "layout/input_error.hpp"
+#include "layout/words.hpp"
+
+namespace linden {
+namespace {
+
+const std::vector<std::string> kNames{"positions", "velocities", "servos", "forces", "energies", "contacts"};
+
+struct EnergyRow {
+  const char* name;
+  bool there;
+};
+
+/// In the order of Observer::energies.
+std::vector<EnergyRow> energy_rows(const Simulation& simulation) {
+  const Effects& e = simulation.effects();
+  const bool gravity = simulation.options().gravity != std::array<double, 3>{0, 0, 0};
+  return {{"kinetic", true},
+          {"gravity", gravity},
+          {"springs", !e.springs.empty() || !e.ball_springs.empty()},
+          {"ground", e.ground.has_value()},
+          {"damping_taken", !e.damping.empty()},
+          {"friction_taken", !e.friction.empty()},
+          {"limits_taken", !e.limits.empty()},
+          {"servo_given", !e.servos.empty()},
+          {"torque_given", !e.torques.empty()},
+          {"wrench_given", !e.wrenches.empty()},
+          {"drag_taken", !e.drag.empty()},
+          {"ground_taken", e.ground.has_value()}};
+}
+
+/// Quantities that there are in the scene.
+std::vector<Quantity> available(const Simulation& simulation) {
+  const Effects& e = simulation.effects();
+  std::vector<Quantity> there{Quantity::positions, Quantity::velocities};
+  if (!e.servos.empty()) there.push_back(Quantity::servos);
+  const bool acts = !(e.springs.empty() && e.ball_springs.empty() && e.damping.empty() && e.friction.empty() && e.limits.empty() &&
+                      e.servos.empty() && e.torques.empty() && e.wrenches.empty() && e.drag.empty() && !e.ground);
+  if (acts) there.push_back(Quantity::forces);
+  there.push_back(Quantity::energies);
+  if (e.ground) there.push_back(Quantity::contacts);
+  return there;
+}
+
+std::vector<std::string> names_of(const std::vector<Quantity>& quantities) {
+  std::vector<std::string> names;
+  for (const Quantity quantity : quantities) names.push_back(std::string(name(quantity)));
+  return names;
+}
+
+}  // namespace
+
+std::string_view name(Quantity quantity) { return kNames[static_cast<std::size_t>(quantity)]; }
+
+std::vector<Quantity> quantities_from(const std::string& text) {
+  std::vector<Quantity> quantities;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    const auto found = std::ranges::find(kNames, word);
+    if (found == kNames.end()) {
+      const std::string guess = nearest(word, kNames);
+      throw InputError(fmt::format("--what {}: \"{}\" is not known; expected some of {}, with commas{}", text, word, fmt::join(kNames, ", "),
+                                   guess.empty() ? "" : fmt::format("; did you mean {}?", guess)));
+    }
+    const auto quantity = static_cast<Quantity>(found - kNames.begin());
+    if (std::ranges::count(quantities, quantity) > 0) throw InputError(fmt::format("--what {} names {} twice", text, word));
+    quantities.push_back(quantity);
+    begin = end + 1;
+  }
+  return quantities;
+}
+
+std::vector<Quantity> usual_quantities(const std::string& file) {
+  if (std::filesystem::path(file).extension() == ".csv") return {Quantity::positions};
+  return {Quantity::positions, Quantity::velocities};
+}
+
+void require_available(const std::vector<Quantity>& asked, const std::vector<Quantity>& there, std::string_view where) {
+  for (const Quantity quantity : asked) {
+    if (std::ranges::find(there, quantity) != there.end()) continue;
+    throw InputError(fmt::format("--what {}: {} has none; expected some of {}; leave it out", name(quantity), where,
+                                 fmt::join(names_of(there), ", ")));
+  }
+}
+
+Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities) : simulation_(simulation), quantities_(std::move(quantities)) {
+  require_available(quantities_, available(simulation), "the scene");
+  const Names& names = simulation.model().names;
+  for (const Quantity quantity : quantities_) {
+    switch (quantity) {
+      case Quantity::positions: add(quantity, recorded_positions(names)); break;
+      case Quantity::velocities: add(quantity, recorded_velocities(names)); break;
+      case Quantity::servos: {
+        simulation.keep_forces();
+        RecordedArray array{"servo_forces", "servos", {}, "servo."};
+        for (const Servo& servo : simulation.effects().servos) array.rows.push_back(names.velocity[static_cast<std::size_t>(servo.row)]);
+        add(quantity, std::move(array));
+        break;
+      }
+      case Quantity::forces:
+        simulation.keep_forces();
+        add(quantity, {"forces", "velocities", names.velocity, "force."});
+        break;
+      case Quantity::energies: {
+        RecordedArray array{"energies", "energy_names", {}, "energy."};
+        for (const EnergyRow& row : energy_rows(simulation)) {
+          if (row.there) array.rows.push_back(row.name);
+        }
+        add(quantity, std::move(array));
+        break;
+      }
+      case Quantity::contacts: {
+        simulation.keep_forces();
+        std::vector<std::string> bodies;
+        for (const BodyContact& contact : simulation.contacts()) bodies.push_back(names.body[static_cast<std::size_t>(contact.slot)]);
+        add(quantity, {"contacts", "contact_bodies", bodies, "contacts."});
+        add(quantity, {"normal_forces", "contact_bodies", bodies, "normal_force."});
+        break;
+      }
+    }
+  }
+}
+
+void Observer::add(Quantity quantity, RecordedArray array) {
+  of_array_.push_back(quantity);
+  arrays_.push_back(std::move(array));
+}
+
+std::vector<double> Observer::energies() {
+  const Energy energy = simulation_.energy();
+  const EffectWork& work = simulation_.effect_work();
+  const std::array<double, 12> all{energy.kinetic, energy.gravity(), energy.springs, energy.ground, work.damping, work.friction,
+                                   work.limits,    work.servo,       work.torque,    work.wrench,   work.drag,    work.ground};
+  std::vector<double> there;
+  const std::vector<EnergyRow> rows = energy_rows(simulation_);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (rows[k].there) there.push_back(all[k]);
+  }
+  return there;
+}
+
+std::span<const std::span<const double>> Observer::look() {
+  numbers_.clear();
+  for (const Quantity quantity : quantities_) {
+    switch (quantity) {
+      case Quantity::positions: numbers_.emplace_back(simulation_.positions().begin(), simulation_.positions().end()); break;
+      case Quantity::velocities: numbers_.push_back(simulation_.velocities()); break;
+      case Quantity::servos: numbers_.push_back(simulation_.servo_torques()); break;
+      case Quantity::forces: numbers_.push_back(simulation_.joint_forces()); break;
+      case Quantity::energies: numbers_.push_back(energies()); break;
+      case Quantity::contacts: {
+        std::vector<double> closed, force;
+        for (const BodyContact& contact : simulation_.contacts()) {
+          closed.push_back(contact.closed);
+          force.push_back(contact.normal_force);
+        }
+        numbers_.push_back(std::move(closed));
+        numbers_.push_back(std::move(force));
+        break;
+      }
+    }
+  }
+  views_.assign(numbers_.begin(), numbers_.end());
+  return views_;
+}
+
+}  // namespace linden
