@@ -34,7 +34,7 @@ namespace {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      shape, dofs, steps, budget;
+      shape, dofs, steps, budget, start;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -61,6 +61,11 @@ void read_model_options(const Texts& texts, std::optional<Base>& base, Options& 
 
 void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
   read_model_options(texts, motion.base, options);
+  motion.gravity_given = !texts.gravity.empty();
+  if (!texts.start.empty() && texts.start != "as-given" && texts.start != "checked") {
+    throw InputError(fmt::format("--start {}: expected checked or as-given", texts.start));
+  }
+  motion.start_as_given = texts.start == "as-given";
   if (!texts.duration.empty()) motion.duration = number_from("--duration", texts.duration, "seconds, such as 10");
   if (!texts.dt.empty()) options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
   if (!texts.tolerance.empty()) {
@@ -182,6 +187,9 @@ struct Adding {
   void spread(const char* group, Texts& texts) const {
     (*this)(group, "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
   }
+  void start(const char* group, Texts& texts) const {
+    (*this)(group, "--start", texts.start, "RULE", "checked (default): a scene may not begin outside limits or in the ground; or as-given");
+  }
 };
 
 CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
@@ -195,6 +203,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add.gravity("Motion", texts);
   add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
   add.spread("Start", texts);
+  add.start("Start", texts);
   add("Start", "--load", run.load, "FILE", "continue from a checkpoint");
   add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
@@ -223,6 +232,7 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
   add.spread("Instances", texts);
+  add.start("Instances", texts);
   add.base("Motion", texts);
   add.strict("Motion", rollout.strict);
   add.duration(texts);
@@ -279,6 +289,7 @@ CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accur
   add.gravity("Motion", texts);
   add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
   add.spread("Start", texts);
+  add.start("Start", texts);
   add("Study", "--budget", texts.budget, "S", "seconds that all of it may take, default 60");
   add("Output", "--json", accuracy.json, "FILE.json", "rows, fits and advice, for scripts");
   add("Output", "--plot", accuracy.plot, "FILE.svg|png", "error and energy over CPU time");

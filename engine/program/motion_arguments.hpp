@@ -29,6 +29,8 @@ struct MotionArguments : ModelArguments {
   double duration = 10;  // [s]
   std::optional<std::uint64_t> seed;
   std::optional<double> spread;
+  bool start_as_given = false;  // no start is refused
+  bool gravity_given = false;   // beside the scene
 };
 
 /// Seed and spread as they are used; nothing where neither was given.

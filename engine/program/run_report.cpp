@@ -102,6 +102,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   }
 
   const EnergyDrift& energy = figures.energy;
+  if (!is_motion(model, energy.scale())) row("motion", kNothingMoves);
   row("energy", fmt::format("{:.6g} J at the start; kinetic energy up to {:.4g} J", energy.initial(), energy.scale()));
   if (!effect_lines(effects, model).empty()) {
     row("  work", fmt::format("effects took {:.6g} J and gave {:.6g} J, which the band below accounts for", figures.taken, figures.given));
@@ -191,6 +192,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"split_steps", figures.run.split_steps},
       {"rounding_floor_steps", figures.run.floor_steps},
       {"residual_max", figures.run.largest_residual},
+      {"moves", is_motion(model, energy.scale())},
       {"energy_initial", energy.initial()},
       {"energy_taken", figures.taken},
       {"energy_given", figures.given},

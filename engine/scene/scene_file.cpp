@@ -12,6 +12,7 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_effects.hpp"
 #include "engine/scene/scene_yaml.hpp"
+#include "engine/start_check.hpp"
 #include "engine/step/effect_plan.hpp"
 #include "layout/merged_models.hpp"
 #include "layout/text_file.hpp"
@@ -24,10 +25,11 @@ namespace {
 using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
-                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "effects"};
+                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects"};
 const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity"};
 const std::vector<std::string> kBases{"fixed", "floating"};
+const std::vector<std::string> kStarts{"checked", "as given"};
 constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 
 /// A model of the list `models`.
@@ -46,12 +48,17 @@ class SceneReader {
     root_.entries_of(kScene, effect_keys(), "effects");
     read_model();
     read_options();
-    const auto initial = root_.find("initial");
-    scene_.initial = read_start(initial, scene_.model, bases_, given_);
+    const auto initial = root_.find("initial"), effects = root_.find("effects");
+    if (const auto rule = root_.find("start")) scene_.start_as_given = rule->choice(kStarts) == "as given";
+    Effects limited;
+    if (effects) limited.limits = read_limits(*effects, scene_.model);
+    scene_.initial = read_start(initial, scene_.model, bases_, given_, limited.limits);
     require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
     require_finite(initial.value_or(root_), "velocity", scene_.initial.velocities, scene_.model.names.velocity);
+    if (!scene_.start_as_given && !limited.limits.empty()) move_onto_limits(limited, initial ? initial->place() : file_);
     scene_.options.gravity = {};
-    if (const auto effects = root_.find("effects")) {
+    scene_.gravity_named = effects && effects->find("gravity");
+    if (effects) {
       SceneEffects read = read_effects(*effects, scene_.model, scene_.initial.positions, folder_);
       scene_.effects = std::move(read.effects);
       scene_.options.gravity = read.gravity;
@@ -62,6 +69,14 @@ class SceneReader {
   }
 
  private:
+  /// What rounding puts outside limits is moved, and told. What cannot be a start is refused by those who begin there.
+  void move_onto_limits(const Effects& limited, const std::string& place) {
+    StartFindings found = StartCheck(scene_.model, scene_.options, limited).look(scene_.initial.positions);
+    if (found.moved.empty()) return;
+    scene_.initial.positions = std::move(found.positions);
+    for (const std::string& moved : found.moved) scene_.model.warnings.push_back(fmt::format("{}: {}", place, moved));
+  }
+
   void warn_of_stiff_ground(const SceneValue& at) {
     const std::optional<StiffContact> stiff = stiffest_unresolved(scene_.model, scene_.options, scene_.effects);
     if (!stiff) return;

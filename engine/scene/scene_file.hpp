@@ -16,6 +16,8 @@
 //   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; where no
 //                    tolerance is given it goes with the order
 //   initial          engine/scene/scene_start.hpp
+//   start            checked (default): a start outside limits, against ties or in the ground is refused where it begins to move
+//                    (engine/start_check.hpp); as given: it begins there all the same
 //   effects          engine/scene/scene_effects.hpp; gravity is one of them: without its key there is none
 //
 // A floating model starts at its position and rotation, a fixed one sits there.

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "engine/initial_state.hpp"
 #include "engine/scene/scene_yaml.hpp"
@@ -44,8 +45,8 @@ struct PlacedBase {
 /// Slots of the free joints that hang on the world.
 std::vector<Index> floating_roots(const Model& model);
 
-/// `at`: the scene's `initial`, where it has one. Throws InputError with file and line.
+/// `at`: the scene's `initial`, where it has one; `limits`: in effect, which random positions keep. Throws InputError with file and line.
 InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
-                        const SceneStart& given);
+                        const SceneStart& given, std::span<const JointLimit> limits = {});
 
 }  // namespace linden
