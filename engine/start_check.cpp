@@ -86,6 +86,13 @@ StartFindings StartCheck::look(std::span<const double> positions) const {
   return found;
 }
 
+StartFindings StartCheck::look_under(std::span<const double> positions) const {
+  StartFindings found;
+  found.positions.assign(positions.begin(), positions.end());
+  look_at_ground(found);
+  return found;
+}
+
 void StartCheck::follow(std::vector<double>& positions) const {
   for (const Mimic& mimic : model_.mimics) positions[at(mimic.follower_q)] = mimic.multiplier * positions[at(mimic.leader_q)] + mimic.offset;
 }

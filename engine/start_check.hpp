@@ -50,6 +50,8 @@ class StartCheck {
 
   /// positions [nq]; empty: the zero configuration.
   StartFindings look(std::span<const double> positions) const;
+  /// The ground alone, of positions [nq] that keep limits and ties.
+  StartFindings look_under(std::span<const double> positions) const;
 
  private:
   void look_at_ties(StartFindings& found) const;

@@ -61,6 +61,10 @@ class Execution {
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
     });
+    look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
+      const auto rows = batch_.positions().instance(i);
+      return std::vector<double>(rows.begin(), rows.end());
+    });
     figures_.bytes = batch_.bytes();
     if (!arguments.record.empty()) {
       file_.emplace(arguments.record, batch_.model().names, arguments.instances);

@@ -57,4 +57,21 @@ void look_at_start(const MotionArguments& arguments, const Model& model, const O
   if (!randomness(arguments)) look_at_zero(arguments, model);  // random positions keep the file's limits
 }
 
+void look_at_instances(const MotionArguments& arguments, const Options& options, std::int64_t instances,
+                       const std::function<std::vector<double>(std::int64_t i)>& positions) {
+  if (!arguments.scene || !arguments.scene->effects.ground || arguments.scene->start_as_given || arguments.start_as_given) return;
+  const StartCheck check(arguments.scene->model, options, arguments.scene->effects);
+  std::int64_t count = 0;
+  std::string first;
+  for (std::int64_t i = 0; i < instances; ++i) {
+    const StartFindings found = check.look_under(positions(i));
+    if (found.sound()) continue;
+    if (count == 0) first = fmt::format("instance {}: {}", i, found.faults.front());
+    count += 1;
+  }
+  if (count == 0) return;
+  fmt::print(stderr, "linden: warning: {} of {} instances start in the ground, by their random joints ({}); raise the base or choose a "
+             "smaller --spread\n", grouped(count), grouped(instances), printable(first));
+}
+
 }  // namespace linden

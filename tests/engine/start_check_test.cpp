@@ -221,5 +221,17 @@ TEST_CASE("a scene in which nothing moves is told so, and no step is advised for
   CHECK_THAT(shell.linden("run moving.yaml").out, !Contains("nothing moves"));
 }
 
+TEST_CASE("a rollout tells how many of its instances random joints put in the ground", "[start]") {
+  Shell shell;
+  // a level leg of a metre whose foot is a ball
+  shell.write("leg.urdf", R"(<robot name="leg"><link name="base"/><link name="leg"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="1 0 0"/><geometry><sphere radius="0.1"/></geometry>
+</collision></link><joint name="hip" type="continuous"><parent link="base"/><child link="leg"/><axis xyz="0 1 0"/></joint></robot>)");
+  shell.write("s.yaml", "model: leg.urdf\nduration: 0.002\neffects: {gravity: [0, 0, -9.81], ground: {height: -0.15}}\n");
+  // 0.05 m of room: a turn of more than 0.05 rad downwards
+  CHECK_THAT(shell.linden("rollout s.yaml --instances 40 --spread 0.3").err, Contains("of 40 instances start") && Contains("link \"leg\""));
+  CHECK(shell.linden("rollout s.yaml --instances 40 --spread 0.04").err.empty());
+}
+
 }  // namespace
 }  // namespace linden
