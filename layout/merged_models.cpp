@@ -149,9 +149,10 @@ class Merger {
       model_.mimics.push_back({follower, leader, tree.first_v(follower), tree.first_v(leader), tree.first_q(follower),
                                tree.first_q(leader), mimic.multiplier, mimic.offset});
     }
-    for (const std::string& warning : from.warnings) {
-      model_.warnings.push_back(parts_[part].name.empty() ? warning : parts_[part].name + ": " + warning);
-    }
+    const auto said = [&](const std::string& text) { return parts_[part].name.empty() ? text : parts_[part].name + ": " + text; };
+    for (const std::string& warning : from.warnings) model_.warnings.push_back(said(warning));
+    for (const std::string& note : from.notes) model_.notes.push_back(said(note));
+    model_.welded_mass += from.welded_mass;
   }
 
   void add_shapes() {

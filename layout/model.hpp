@@ -22,6 +22,8 @@ struct Model {
   std::string source;                 // file it was read from, which names of meshes are relative to; empty = made in code
   std::vector<BodyShape> shapes;      // sorted by slot; none of slot 0
   std::vector<std::string> warnings;  // what the source said that was read with a grain of salt
+  std::vector<std::string> notes;     // what was done because it was asked for, such as mass from a density
+  double welded_mass = 0;             // of links fixed to the world: it moves nothing and is no part of subtree_mass [kg]
 
   /// Free coordinates: velocities less the mimic joints.
   Index degrees_of_freedom() const { return tree.shape.velocities - static_cast<Index>(mimics.size()); }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <new>
 #include <optional>
@@ -34,7 +35,7 @@ namespace {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      shape, dofs, steps, budget, start;
+      shape, dofs, steps, budget, start, density;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -54,6 +55,15 @@ std::array<double, 3> gravity_from(const std::string& text) {
   return gravity;
 }
 
+std::optional<double> density_from(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const double density = number_from("--density", text, "kg/m^3, such as 1000");
+  if (!(density > 0) || !std::isfinite(density)) {
+    throw InputError(fmt::format("--density {}: expected a finite number above zero [kg/m^3], such as 1000", text));
+  }
+  return density;
+}
+
 void read_model_options(const Texts& texts, std::optional<Base>& base, Options& options) {
   if (!texts.base.empty()) base = base_from(texts.base);
   if (!texts.gravity.empty()) options.gravity = gravity_from(texts.gravity);
@@ -61,6 +71,7 @@ void read_model_options(const Texts& texts, std::optional<Base>& base, Options& 
 
 void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
   read_model_options(texts, motion.base, options);
+  motion.density = density_from(texts.density);
   motion.gravity_given = !texts.gravity.empty();
   if (!texts.start.empty() && texts.start != "as-given" && texts.start != "checked") {
     throw InputError(fmt::format("--start {}: expected checked or as-given", texts.start));
@@ -89,9 +100,11 @@ void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
     throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", arguments.model));
   }
   SceneStart start;
+  start.density = arguments.density;
   if constexpr (std::is_base_of_v<MotionArguments, Arguments> && !std::is_same_v<Arguments, RolloutArguments>) {
     if (arguments.spread) check_spread(*arguments.spread);
-    start = {arguments.seed, arguments.spread};
+    start.seed = arguments.seed;
+    start.spread = arguments.spread;
   }
   arguments.scene = std::make_shared<const Scene>(load_scene(arguments.model, start));
   options = arguments.scene->options;
@@ -151,7 +164,10 @@ void read_accuracy_options(const Texts& texts, AccuracyArguments& accuracy) {
 }
 
 void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
-  read_over_scene(inspect, inspect.options, [&] { read_model_options(texts, inspect.base, inspect.options); });
+  read_over_scene(inspect, inspect.options, [&] {
+    read_model_options(texts, inspect.base, inspect.options);
+    inspect.density = density_from(texts.density);
+  });
   if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
 }
 
@@ -176,6 +192,9 @@ struct Adding {
   void base(const char* group, Texts& texts) const {
     (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
   }
+  void density(const char* group, Texts& texts) const {
+    (*this)(group, "--density", texts.density, "D", "[kg/m^3] give links of a URDF without inertia the mass of their shapes, such as 1000");
+  }
   void strict(const char* group, bool& strict) const {
     command->add_flag("--strict", strict, "refuse a model or scene that gives warnings")->group(group);
   }
@@ -197,6 +216,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   const Adding add{command};
   add.model(run.model, kSceneHelp);
   add.base("Motion", texts);
+  add.density("Motion", texts);
   add.strict("Motion", run.strict);
   add.duration(texts);
   add.step(texts);
@@ -234,6 +254,7 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add.spread("Instances", texts);
   add.start("Instances", texts);
   add.base("Motion", texts);
+  add.density("Motion", texts);
   add.strict("Motion", rollout.strict);
   add.duration(texts);
   add.step(texts);
@@ -283,6 +304,7 @@ CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accur
   const Adding add{command};
   add.model(accuracy.model, kSceneHelp);
   add.base("Motion", texts);
+  add.density("Motion", texts);
   add.strict("Motion", accuracy.strict);
   add.duration(texts);
   add("Motion", "--dt", texts.dt, "S", "steps from 16 times to a quarter of this are tried, default 1e-3");
@@ -308,6 +330,7 @@ CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect
   const Adding add{command};
   add.model(inspect.model, kSceneHelp);
   add.base("Options", texts);
+  add.density("Options", texts);
   add.strict("Options", inspect.strict);
   add.gravity("Options", texts);
   add("Options", "--solver", texts.solver, "NAME", "newton (default) or riqn");

@@ -17,6 +17,7 @@ namespace linden {
 struct ModelArguments {
   std::string model;  // as it was given: a file, a generator with its size, a scene
   std::optional<Base> base;
+  std::optional<double> density;  // of links without inertia [kg/m^3]
   bool strict = false;  // a model that gives warnings is refused
   std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
 

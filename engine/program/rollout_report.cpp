@@ -142,6 +142,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"failure_texts", figures.failures},
       {"interrupted", figures.signal != 0},
       {"warnings", model.warnings},
+      {"notes", model.notes},
   };
 }
 

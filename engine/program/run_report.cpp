@@ -214,6 +214,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"interrupted", figures.signal != 0},
       {"advice", if_given(fmt::format("{}", fmt::join(energy_warnings(simulation, energy), "; ")))},
       {"warnings", model.warnings},
+      {"notes", model.notes},
   };
 }
 

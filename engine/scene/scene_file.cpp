@@ -25,10 +25,12 @@ namespace {
 using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
-                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects"};
+                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
+                                      "inertia"};
 const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
-                                      "rotation", "quaternion", "velocity", "angular_velocity"};
+                                      "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
+const std::vector<std::string> kInertia{"density"};
 const std::vector<std::string> kStarts{"checked", "as given"};
 constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 
@@ -88,15 +90,16 @@ class SceneReader {
   }
 
   void read_model() {
-    const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base");
+    const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base"), inertia = root_.find("inertia");
     if (one && several) several->fail("model and models are both given", "one of them", "move the model into the list models");
     if (!one && !several)
       root_.fail("the scene has no model", "model: and a URDF file, or a generated one such as chain:3", "add it");
     if (one) {
-      scene_.model = load(*one, base);
+      scene_.model = load(*one, base, inertia);
       return;
     }
     if (base) base->fail("base stands beside models", "base beside each model of the list", "move it there");
+    if (inertia) inertia->fail("inertia stands beside models", "inertia beside each model of the list", "move it there");
     read_models(*several);
   }
 
@@ -110,12 +113,25 @@ class SceneReader {
     }
   }
 
-  Model load(const SceneValue& at, const std::optional<SceneValue>& base) const {
+  /// Of links without inertia [kg/m^3]; the command line goes over the scene.
+  std::optional<double> density_of(const std::optional<SceneValue>& inertia) const {
+    std::optional<double> density;
+    if (inertia) {
+      inertia->entries_of(kInertia);
+      const auto value = inertia->find("density");
+      if (!value) inertia->refuse("{density: number} in kg/m^3, such as 1000", "write one, or leave it out");
+      density = value->positive();
+    }
+    return given_.density ? given_.density : density;
+  }
+
+  Model load(const SceneValue& at, const std::optional<SceneValue>& base, const std::optional<SceneValue>& inertia) const {
     const std::string& name = at.text(kAModel);
     const std::optional<Base> root =
         base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
     if (is_generated(name)) {
       if (base) base->fail(fmt::format("base, but {} is generated, base and all", name), "it beside a URDF file", "leave it out");
+      if (inertia) inertia->fail(fmt::format("inertia, but {} is generated, mass and all", name), "it beside a URDF file", "leave it out");
       return at.located([&] {
         check_memory(name);
         return generate(name);
@@ -128,7 +144,7 @@ class SceneReader {
       at.fail(fmt::format("{}: there is no file {}", at.path(), linden::quoted(file)), "a URDF file, found relative to the scene",
               "check the path; a generated model is written chain:3");
     }
-    return load_urdf(file, root.value_or(Base::fixed));
+    return load_urdf(file, root.value_or(Base::fixed), Reading::lenient, density_of(inertia));
   }
 
   void read_models(const SceneValue& at) {
@@ -141,7 +157,7 @@ class SceneReader {
       if (!model)
         item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3",
                   "add it");
-      entrants.push_back({item, {load(*model, item.find("base")), "", Pose::Identity()}, read_base(item)});
+      entrants.push_back({item, {load(*model, item.find("base"), item.find("inertia")), "", Pose::Identity()}, read_base(item)});
       const auto name = item.find("name");
       if (name) entrants.back().placed.name = name->text("a name");
     }

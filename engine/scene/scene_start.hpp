@@ -22,6 +22,7 @@ namespace linden {
 struct SceneStart {
   std::optional<std::uint64_t> seed;
   std::optional<double> spread;
+  std::optional<double> density{};  // of links without inertia [kg/m^3], of all models that are URDF files
 };
 
 /// Pose and velocity of a base in the world, as far as they are given.
