@@ -150,7 +150,7 @@ class Build {
       if (parent.body >= 0) {
         bodies_[static_cast<std::size_t>(parent.body)].inertia += OriginInertia(link.inertia, joint);
       } else {
-        model_.welded_mass += link.inertia.mass;
+        welded_ += OriginInertia(link.inertia, joint);
       }
       return;
     }
@@ -254,18 +254,15 @@ class Build {
           constants.tree_placement(i, 3 * row + column) = body.placement.linear()(row, column);
         }
         constants.tree_placement(i, 9 + row) = body.placement.translation()[row];
-        constants.inertia(i, 1 + row) = body.inertia.moment[row];
       }
-      constants.inertia(i, 0) = body.inertia.mass;
-      int next = 4;
-      for (int row = 0; row < 3; ++row) {
-        for (int column = row; column < 3; ++column) constants.inertia(i, next++) = body.inertia.about_origin(row, column);
-      }
+      const std::array<double, 10> inertia = body.inertia.numbers();
+      for (int k = 0; k < 10; ++k) constants.inertia(i, k) = inertia[static_cast<std::size_t>(k)];
       names.body.push_back(body.link);
       names.joint.push_back(body.joint);
       name_coordinates(body);
       set_attributes(i, body);
     }
+    model_.welded.inertia = welded_.numbers();
     sum_subtree_masses(tree, constants);
     for (std::size_t link = 0; link < links_.size(); ++link) {
       names.link[links_[link].name] = {slot_of(carrier_[link].body), carrier_[link].pose};
@@ -276,14 +273,13 @@ class Build {
   void collect_shapes() {
     for (std::size_t link = 0; link < links_.size(); ++link) {
       const Index slot = slot_of(carrier_[link].body);
-      if (slot == 0) continue;
       for (const LinkShape& shape : links_[link].shapes) {
         const Pose pose(carrier_[link].pose * shape.pose);
         if (!pose.matrix().allFinite()) {
           fail(fmt::format("link {}: a collision shape lies too far away for numbers; expected metres; check its origin",
                            quoted(links_[link].name)));
         }
-        model_.shapes.push_back({slot, links_[link].name, pose, shape.shape});
+        (slot == 0 ? model_.welded.shapes : model_.shapes).push_back({slot, links_[link].name, pose, shape.shape});
       }
     }
     std::stable_sort(model_.shapes.begin(), model_.shapes.end(),
@@ -476,6 +472,7 @@ class Build {
   std::unordered_map<std::string, std::size_t> link_at_, joint_at_;
   std::vector<std::size_t> order_;
   std::vector<Carrier> carrier_;
+  OriginInertia welded_;  // of links fixed to the world
   std::vector<Body> bodies_;
   std::vector<Index> slot_of_body_;
   std::vector<int> body_in_slot_;

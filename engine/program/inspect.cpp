@@ -206,7 +206,7 @@ class Printer {
                                counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics));
     row("mass", fmt::format("{:.6g} kg; centre of mass ({:.6g}, {:.6g}, {:.6g}) m in the zero configuration", masses.mass,
                             masses.center.x(), masses.center.y(), masses.center.z()));
-    if (model_.welded_mass > 0) row("", fmt::format("{:.6g} kg of links fixed to the world beside it, which move nothing", model_.welded_mass));
+    if (model_.welded.mass() > 0) row("", fmt::format("{:.6g} kg of links fixed to the world beside it, which move nothing", model_.welded.mass()));
     row("tree", fmt::format("{}, up to {} wide; {} of one joint kind", counted(tree.levels() - 1, "level"),
                             counted(widest_level(tree), "body"), counted(static_cast<std::int64_t>(tree.runs.size()), "run")));
     row("memory", fmt::format("state {}, constants {}, workspace {}", memory_text(bytes_for<State<double>>(tree.shape)),
@@ -350,7 +350,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
               {"positions", tree.shape.positions},
               {"velocities", tree.shape.velocities},
               {"mass", masses.mass},
-              {"welded_mass", model.welded_mass},
+              {"welded_mass", model.welded.mass()},
               {"center_of_mass", {masses.center.x(), masses.center.y(), masses.center.z()}},
               {"levels", tree.levels() - 1},
               {"widest_level", widest_level(tree)},

@@ -27,7 +27,7 @@ using Kind = SceneValue::Kind;
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
                                       "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
                                       "inertia"};
-const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
+const std::vector<std::string> kModel{"model",    "base",       "name",     "parent", "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
 const std::vector<std::string> kInertia{"density"};
@@ -160,6 +160,7 @@ class SceneReader {
       entrants.push_back({item, {load(*model, item.find("base"), item.find("inertia")), "", Pose::Identity()}, read_base(item)});
       const auto name = item.find("name");
       if (name) entrants.back().placed.name = name->text("a name");
+      if (const auto parent = item.find("parent")) entrants.back().placed.parent = parent->text("a link of another model, such as crane/hook");
     }
     if (entrants.empty()) at.refuse("a list of models", "add one");
     give_names(entrants);

@@ -307,7 +307,7 @@ TEST_CASE("a floating base without inertia gets the mass of its shapes too, a fi
   const std::string xml = robot(massless("a", turned_box("collision")) + link("b") + joint("j", "continuous", "a", "b"));
   const Model floating = dense(xml, "test.urdf", Base::floating), fixed = dense(xml);
   REQUIRE(floating.constants.subtree_mass(0) == Approx(26));
-  REQUIRE(floating.welded_mass == 0);
+  REQUIRE(floating.welded.mass() == 0);
   REQUIRE(fixed.constants.subtree_mass(0) == Approx(2));
-  REQUIRE(fixed.welded_mass == Approx(24));
+  REQUIRE(fixed.welded.mass() == Approx(24));
 }
