@@ -104,7 +104,8 @@ class BatchOf {
   Instructions instructions() const;
 
   /// Starts instance i anew at time 0, its record cleared: positions [nq], velocities [nv], conventions and errors as Simulation's. Others are not
-  /// touched; several threads may reset different instances at once.
+  /// touched; several threads may reset different instances at once. Whether the positions lie within limits or in the ground is not looked
+  /// at, resets being many: StartCheck (engine/start_check.hpp) does that where it is wanted.
   void reset(std::int64_t i, std::span<const double> positions, std::span<const double> velocities);
   /// reset of every instance on all threads; start(i, positions, velocities) fills both, given as the neutral state at rest.
   void reset_all(const std::function<void(std::int64_t i, std::span<double> positions, std::span<double> velocities)>& start);

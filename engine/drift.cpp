@@ -7,6 +7,11 @@
 #include "engine/mass_distribution.hpp"
 
 namespace linden {
+
+bool is_motion(const Model& model, double kinetic) {
+  constexpr double kRest = 1e-12;  // [m/s]
+  return kinetic > 0.5 * model.constants.subtree_mass(0) * kRest * kRest;
+}
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();

@@ -24,6 +24,12 @@ namespace linden {
 /// band looks as often, since one that is looked at seldom is narrower.
 std::int64_t energy_stride(std::int64_t steps);
 
+/// What is said of a run without any motion.
+inline constexpr const char* kNothingMoves = "none: nothing moves at the start, and no force sets anything moving";
+
+/// Whether that much kinetic energy is more than rounding makes of rest: more than the whole mass has at 1e-12 m/s.
+bool is_motion(const Model& model, double kinetic);
+
 /// Least squares through (x, y), one point after another.
 class LineFit {
  public:

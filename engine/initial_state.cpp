@@ -14,9 +14,24 @@ Eigen::Vector3d random_arrow(Random& random, double most) {
   return length * Eigen::Vector3d(across * std::cos(turn), across * std::sin(turn), z);
 }
 
+/// A limit, and the row of the position that it is on.
+struct Bounded {
+  std::size_t q_row;
+  const JointLimit* limit;
+};
+
+std::vector<Bounded> bounded(const Model& model, std::span<const JointLimit> limits) {
+  std::vector<Bounded> result;
+  if (limits.empty()) return result;
+  std::vector<Index> q_row(static_cast<std::size_t>(model.tree.shape.velocities));
+  for (Index i = 1; i < model.tree.shape.slots; ++i) q_row[static_cast<std::size_t>(model.tree.first_v(i))] = model.tree.first_q(i);
+  for (const JointLimit& limit : limits) result.push_back({static_cast<std::size_t>(q_row[static_cast<std::size_t>(limit.row)]), &limit});
+  return result;
+}
+
 }  // namespace
 
-InitialState random_state(const Model& model, std::uint64_t seed, double spread) {
+InitialState random_state(const Model& model, std::uint64_t seed, double spread, std::span<const JointLimit> limits) {
   const Tree& tree = model.tree;
   const double rate = spread / std::sqrt(static_cast<double>(tree.levels() - 1));
   Random random(seed);
@@ -42,10 +57,15 @@ InitialState random_state(const Model& model, std::uint64_t seed, double spread)
       if (run.kind == JointKind::free) put(state.velocities, v + 3, random_arrow(random, spread));
     }
   }
+  for (const Bounded& joint : bounded(model, limits)) {
+    double& q = state.positions[joint.q_row];
+    q = std::clamp(q, joint.limit->lower, joint.limit->upper);
+  }
   return state;
 }
 
-InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread) {
+InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread,
+                           std::span<const JointLimit> limits) {
   const InitialState random = random_state(model, seed, spread);
   InitialState state = start;
   if (state.positions.empty()) state.positions = model.neutral();
@@ -59,6 +79,11 @@ InitialState random_around(const Model& model, const InitialState& start, std::u
       // a start beyond a limit is the scene's own
       q = std::clamp(moved, std::min(q, model.attributes.lower(v)), std::max(q, model.attributes.upper(v)));
     }
+  }
+  const std::vector<double> begin = start.positions.empty() ? model.neutral() : start.positions;
+  for (const Bounded& joint : bounded(model, limits)) {
+    double& q = state.positions[joint.q_row];
+    q = std::clamp(q, std::min(begin[joint.q_row], joint.limit->lower), std::max(begin[joint.q_row], joint.limit->upper));
   }
   for (std::size_t k = 0; k < state.velocities.size(); ++k) state.velocities[k] += random.velocities[k];
   return state;

@@ -8,12 +8,17 @@
 // depth: the number of levels of the tree. Down a chain the rates of joints add up like a random walk, so this lets the bodies of a
 // chain of 10,000 links turn no faster than those of a short one; without it their tips would move at a kilometre per second.
 //
+// Where a scene has limits in effect (JointLimit) they are kept too, those of followers with their leaders': a draw that falls outside is moved
+// onto the limit, all others stay as they are drawn.
+//
 // Followers of mimic joints follow their leaders when a Simulation takes the numbers.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "layout/effects.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
@@ -26,10 +31,12 @@ struct InitialState {
 inline constexpr std::uint64_t kDefaultSeed = 1;
 inline constexpr double kDefaultSpread = 0.1;
 
-InitialState random_state(const Model& model, std::uint64_t seed, double spread);
+/// `limits`: in effect, one a row, as Effects has them.
+InitialState random_state(const Model& model, std::uint64_t seed, double spread, std::span<const JointLimit> limits = {});
 
-/// A given start with those numbers on top: positions of screws, within their limits, and all velocities; orientations and places of ball
-/// and free joints stay.
-InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread);
+/// A given start with those numbers on top: positions of screws, within their limits and no farther outside than the start is, and all
+/// velocities; orientations and places of ball and free joints stay.
+InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread,
+                           std::span<const JointLimit> limits = {});
 
 }  // namespace linden

@@ -8,6 +8,7 @@
 
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
+#include "engine/start_check.hpp"
 #include "engine/step/composition.hpp"
 #include "engine/step/instance_stepper.hpp"
 #include "engine/threads.hpp"
@@ -47,7 +48,7 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
 }
 
 Simulation::Simulation(const Scene& scene) : Simulation(scene.model, scene.options, scene.effects) {
-  if (!scene.initial.positions.empty()) set_positions(scene.initial.positions);
+  if (const std::vector<double> positions = checked_start(scene); !positions.empty()) set_positions(positions);
   if (!scene.initial.velocities.empty()) set_velocities(scene.initial.velocities);
 }
 

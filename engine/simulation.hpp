@@ -48,7 +48,8 @@ class Simulation {
   /// At rest in the model's zero configuration, but for joints whose motion is given. Throws InputError for options and effects that make no sense, and for a null pointer.
   explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
   explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
-  /// At the start of the scene (engine/scene/scene.hpp).
+  /// At the start of the scene (engine/scene/scene.hpp). Throws InputError too where that lies outside limits, contradicts ties or is in the
+  /// ground, unless the scene takes it as given (engine/start_check.hpp). Positions that are set later are not looked at.
   explicit Simulation(const Scene& scene);
 
   const Model& model() const { return *model_; }

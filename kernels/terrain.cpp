@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "kernels/terrain_height.hpp"
+
 namespace linden {
 namespace {
 
@@ -28,6 +30,8 @@ Vec3<double> vertex_of(const HeightField& field, Index i, Index j) {
           field.heights[static_cast<std::size_t>(row * field.columns + column)]};
 }
 
+}  // namespace
+
 double height_below(const HeightField& field, double x, double y) {
   const double u = (x - field.origin_x) / field.spacing_x, v = (y - field.origin_y) / field.spacing_y;
   if (!(std::abs(u) < 2 * kFarOff && std::abs(v) < 2 * kFarOff)) return -std::numeric_limits<double>::infinity();
@@ -36,6 +40,8 @@ double height_below(const HeightField& field, double x, double y) {
   if (a + b <= 1) return (1 - a - b) * vertex_of(field, i, j).z + a * h10 + b * h01;
   return (a + b - 1) * vertex_of(field, i + 1, j + 1).z + (1 - b) * h10 + (1 - a) * h01;
 }
+
+namespace {
 
 /// What lengths of a map are rounded by [m].
 double rounding_of(const HeightField& field) { return 1e-12 * (field.spacing_x + field.spacing_y); }

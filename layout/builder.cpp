@@ -23,6 +23,10 @@ using Eigen::Vector3d;
 /// A joint is taken to move nothing when the inertia it feels is below this share of what its subtree could have.
 constexpr double kMovesNothing = 1e-14;
 
+/// What else there is for links without mass, behind the advice to give them one.
+constexpr const char* kWayOut =
+    "; links that have shapes and no inertia get one by --density 1000, in a scene by inertia: {density: 1000}";
+
 /// A moving body before sorting: parents are indices into the same list, -1 the world.
 struct Body {
   std::string link, joint;
@@ -143,7 +147,11 @@ class Build {
     }
     if (link.type == JointType::fixed) {
       carrier_[at] = {parent.body, joint};
-      if (parent.body >= 0) bodies_[static_cast<std::size_t>(parent.body)].inertia += OriginInertia(link.inertia, joint);
+      if (parent.body >= 0) {
+        bodies_[static_cast<std::size_t>(parent.body)].inertia += OriginInertia(link.inertia, joint);
+      } else {
+        welded_ += OriginInertia(link.inertia, joint);
+      }
       return;
     }
     if (link.type == JointType::ball || link.type == JointType::free) {
@@ -246,18 +254,15 @@ class Build {
           constants.tree_placement(i, 3 * row + column) = body.placement.linear()(row, column);
         }
         constants.tree_placement(i, 9 + row) = body.placement.translation()[row];
-        constants.inertia(i, 1 + row) = body.inertia.moment[row];
       }
-      constants.inertia(i, 0) = body.inertia.mass;
-      int next = 4;
-      for (int row = 0; row < 3; ++row) {
-        for (int column = row; column < 3; ++column) constants.inertia(i, next++) = body.inertia.about_origin(row, column);
-      }
+      const std::array<double, 10> inertia = body.inertia.numbers();
+      for (int k = 0; k < 10; ++k) constants.inertia(i, k) = inertia[static_cast<std::size_t>(k)];
       names.body.push_back(body.link);
       names.joint.push_back(body.joint);
       name_coordinates(body);
       set_attributes(i, body);
     }
+    model_.welded.inertia = welded_.numbers();
     sum_subtree_masses(tree, constants);
     for (std::size_t link = 0; link < links_.size(); ++link) {
       names.link[links_[link].name] = {slot_of(carrier_[link].body), carrier_[link].pose};
@@ -268,14 +273,13 @@ class Build {
   void collect_shapes() {
     for (std::size_t link = 0; link < links_.size(); ++link) {
       const Index slot = slot_of(carrier_[link].body);
-      if (slot == 0) continue;
       for (const LinkShape& shape : links_[link].shapes) {
         const Pose pose(carrier_[link].pose * shape.pose);
         if (!pose.matrix().allFinite()) {
           fail(fmt::format("link {}: a collision shape lies too far away for numbers; expected metres; check its origin",
                            quoted(links_[link].name)));
         }
-        model_.shapes.push_back({slot, links_[link].name, pose, shape.shape});
+        (slot == 0 ? model_.welded.shapes : model_.shapes).push_back({slot, links_[link].name, pose, shape.shape});
       }
     }
     std::stable_sort(model_.shapes.begin(), model_.shapes.end(),
@@ -355,8 +359,8 @@ class Build {
       moves[static_cast<std::size_t>(i)] = felt > kMovesNothing * possible;
       if (!moves[static_cast<std::size_t>(i)] && leader[static_cast<std::size_t>(i)] == 0) {
         fail(fmt::format("joint {} moves nothing that resists: link {} and all below it have a mass of {:.3g} kg and an "
-                         "inertia of {:.3g} kg m^2 in the direction the joint frees; give the link an inertia, or fix the joint",
-                         quoted(body.joint), quoted(body.link), whole.mass, std::max(felt, 0.0)));
+                         "inertia of {:.3g} kg m^2 in the direction the joint frees; give the link an inertia, or fix the joint{}",
+                         quoted(body.joint), quoted(body.link), whole.mass, std::max(felt, 0.0), kWayOut));
       }
       if (body.parent >= 0) {
         composite[static_cast<std::size_t>(slot_of(body.parent))] += whole.seen_from(body.placement);
@@ -375,9 +379,9 @@ class Build {
     for (const Mimic& mimic : model_.mimics) {
       if (moving.contains(mimic.leader_slot)) continue;
       fail(fmt::format("joint {} moves nothing that resists, nor does {} or any other joint that follows it; expected one that moves a "
-                       "link with an inertia in the direction the joint frees; give link {} an inertia, or fix the joints",
+                       "link with an inertia in the direction the joint frees; give link {} an inertia, or fix the joints{}",
                        quoted(in_slot(mimic.leader_slot).joint), quoted(in_slot(mimic.follower_slot).joint),
-                       quoted(in_slot(mimic.leader_slot).link)));
+                       quoted(in_slot(mimic.leader_slot).link), kWayOut));
     }
   }
 
@@ -388,12 +392,12 @@ class Build {
     const bool leads = std::ranges::any_of(model_.mimics, [&](const Mimic& mimic) { return mimic.leader_slot == slot; });
     if (leads) {
       fail(fmt::format("joint {} and those that follow it move nothing that resists, or nothing that other joints do not move in the "
-                       "same way; expected joints that each move something of their own; give link {} an inertia, or fix one of them",
-                       quoted(body.joint), quoted(body.link)));
+                       "same way; expected joints that each move something of their own; give link {} an inertia, or fix one of them{}",
+                       quoted(body.joint), quoted(body.link), kWayOut));
     }
     fail(fmt::format("joint {} moves nothing that joints below it do not move in the same way, with no inertia between them; expected "
-                     "joints that each move something of their own; give link {} an inertia, or fix one of the joints",
-                     quoted(body.joint), quoted(body.link)));
+                     "joints that each move something of their own; give link {} an inertia, or fix one of the joints{}",
+                     quoted(body.joint), quoted(body.link), kWayOut));
   }
 
   /// Who leads a joint in the end: q = multiplier q_leader + offset. Who follows nobody leads itself.
@@ -468,6 +472,7 @@ class Build {
   std::unordered_map<std::string, std::size_t> link_at_, joint_at_;
   std::vector<std::size_t> order_;
   std::vector<Carrier> carrier_;
+  OriginInertia welded_;  // of links fixed to the world
   std::vector<Body> bodies_;
   std::vector<Index> slot_of_body_;
   std::vector<int> body_in_slot_;
@@ -504,6 +509,15 @@ TreeBuilder& TreeBuilder::warn(std::string message) {
   return *this;
 }
 
-Model TreeBuilder::build() const { return Build(name_, source_, links_, warnings_).run(); }
+TreeBuilder& TreeBuilder::note(std::string message) {
+  notes_.push_back(std::move(message));
+  return *this;
+}
+
+Model TreeBuilder::build() const {
+  Model model = Build(name_, source_, links_, warnings_).run();
+  model.notes = notes_;
+  return model;
+}
 
 }  // namespace linden

@@ -74,6 +74,7 @@ class TreeBuilder {
   TreeBuilder& source(std::string source);
   TreeBuilder& add(LinkSpec link);
   TreeBuilder& warn(std::string message);
+  TreeBuilder& note(std::string message);
 
   /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a shape of negative size, a
   /// coordinate that moves no mass or none that others do not move in the same way, a mimic of a joint that does not exist or is no
@@ -84,7 +85,7 @@ class TreeBuilder {
   std::string name_;
   std::string source_;
   std::vector<LinkSpec> links_;
-  std::vector<std::string> warnings_;
+  std::vector<std::string> warnings_, notes_;
 };
 
 }  // namespace linden

@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 #include <tinyxml2.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <charconv>
 #include <numbers>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -28,7 +32,7 @@ constexpr std::size_t kMostElements = 200'000, kMostPoints = 20'000'000;
 
 class Collada {
  public:
-  explicit Collada(const std::string& file) : file_(file) {
+  Collada(const std::string& file, MeshSink& sink) : file_(file), sink_(sink) {
     const std::string text = read_text(file, "a COLLADA file");
     if (const int line = line_of_crowded_element(text); line > 0) {
       fail(fmt::format("the element in line {} has more than {} attributes", line, kMostAttributes), "a COLLADA file");
@@ -41,14 +45,13 @@ class Collada {
     index_ids();
   }
 
-  MeshBox box() {
+  void read() {
+    meter_ = meters_per_unit();
     if (const XMLElement* scene = shown_scene()) {
       walk(*scene);
     } else {
       for (const XMLElement* geometry : geometries_) show(*geometry, Affine3d::Identity());
     }
-    const double meter = meters_per_unit();
-    return box_.isEmpty() ? box_ : MeshBox(meter * box_.min(), meter * box_.max());
   }
 
  private:
@@ -168,11 +171,103 @@ class Collada {
   }
 
   void show(const XMLElement& geometry, const Affine3d& pose) {
-    const auto [at, first_time] = points_.try_emplace(&geometry);
-    if (first_time) at->second = points_of(geometry);
-    points_shown_ += at->second.size();
+    const auto [at, first_time] = shapes_.try_emplace(&geometry);
+    Shape& shape = at->second;
+    if (first_time) {
+      shape.points = points_of(geometry);
+      if (sink_.wants_triangles()) shape.triangles = triangles_of(geometry, shape.points.size());
+    }
+    const auto before = static_cast<std::uint32_t>(points_shown_);
+    points_shown_ += shape.points.size();
+    triangles_shown_ += shape.triangles.size();
     if (points_shown_ > kMostPoints) fail(fmt::format("its scene shows over {} points", kMostPoints), "a smaller scene");
-    for (const Vector3d& point : at->second) box_.extend(pose * point);
+    if (triangles_shown_ > kMostPoints) fail(fmt::format("its scene shows over {} triangles", kMostPoints), "a smaller scene");
+    for (const Vector3d& point : shape.points) sink_.point(meter_ * (pose * point));
+    const bool mirrored = pose.linear().determinant() < 0;
+    for (const auto& [a, b, c] : shape.triangles) sink_.triangle(before + a, before + (mirrored ? c : b), before + (mirrored ? b : c));
+  }
+
+  using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+  /// A geometry in its own frame.
+  struct Shape {
+    std::vector<Vector3d> points;
+    Triangles triangles;
+  };
+
+  /// Of the surfaces of a <mesh>, whose `points` they name.
+  Triangles triangles_of(const XMLElement& geometry, std::size_t points) const {
+    Triangles triangles;
+    const XMLElement* mesh = geometry.FirstChildElement("mesh");
+    for (const XMLElement* at = mesh ? mesh->FirstChildElement() : nullptr; at; at = at->NextSiblingElement()) {
+      const std::string_view tag = at->Name();
+      if (tag != "triangles" && tag != "polylist" && tag != "polygons" && tag != "tristrips" && tag != "trifans") continue;
+      std::string_view counts = at->FirstChildElement("vcount") ? content_of(*at->FirstChildElement("vcount")) : "";
+      for (const XMLElement* p = at->FirstChildElement("p"); p; p = p->NextSiblingElement("p")) {
+        std::vector<std::uint32_t> corners = corners_of(*at, *p, points);
+        if (tag == "triangles") {
+          cut(corners, 3, triangles);
+        } else if (tag == "polylist") {
+          cut(corners, counts, at->GetLineNum(), triangles);
+        } else if (tag == "tristrips") {
+          for (std::size_t k = 2; k < corners.size(); ++k) {
+            const std::size_t odd = k % 2;
+            triangles.push_back({corners[k - 2 + odd], corners[k - 1 - odd], corners[k]});
+          }
+        } else {
+          cut(corners, corners.size(), triangles);
+        }
+      }
+    }
+    return triangles;
+  }
+
+  /// Numbers of points: one of those that stand together for each corner.
+  std::vector<std::uint32_t> corners_of(const XMLElement& surface, const XMLElement& list, std::size_t points) const {
+    unsigned stride = 1, offset = 0;
+    for (const XMLElement* input = surface.FirstChildElement("input"); input; input = input->NextSiblingElement("input")) {
+      const unsigned its = std::min(input->UnsignedAttribute("offset", 0), 1000U);
+      stride = std::max(stride, its + 1);
+      if (input->Attribute("semantic", "VERTEX")) offset = its;
+    }
+    std::vector<std::uint32_t> corners;
+    std::string_view rest = content_of(list);
+    unsigned next = 0;
+    for (std::string_view word = next_word(rest); !word.empty(); word = next_word(rest)) {
+      if (next == offset) {
+        std::uint32_t number = 0;
+        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+        if (error != std::errc{} || end != word.data() + word.size() || number >= points) {
+          fail(fmt::format("a surface of line {} names the point {}", surface.GetLineNum(), quoted(word)),
+               fmt::format("one of its {} points", points));
+        }
+        corners.push_back(number);
+      }
+      next = next + 1 == stride ? 0 : next + 1;
+    }
+    return corners;
+  }
+
+  /// Polygons of `each` corners to triangles; what is left over at the end is none.
+  static void cut(const std::vector<std::uint32_t>& corners, std::size_t each, Triangles& triangles) {
+    if (each < 3) return;
+    for (std::size_t first = 0; first + each <= corners.size(); first += each) {
+      for (std::size_t k = first + 2; k < first + each; ++k) triangles.push_back({corners[first], corners[k - 1], corners[k]});
+    }
+  }
+
+  /// Of as many corners each as `counts` says.
+  void cut(const std::vector<std::uint32_t>& corners, std::string_view counts, int line, Triangles& triangles) const {
+    std::size_t first = 0;
+    for (std::string_view word = next_word(counts); !word.empty(); word = next_word(counts)) {
+      std::size_t each = 0;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), each);
+      if (error != std::errc{} || end != word.data() + word.size() || each > corners.size() - first) {
+        fail(fmt::format("a <vcount> of line {} holds {}", line, quoted(word)), "no more corners than <p> has");
+      }
+      for (std::size_t k = first + 2; k < first + each; ++k) triangles.push_back({corners[first], corners[k - 1], corners[k]});
+      first += each;
+    }
   }
 
   /// Positions of a <mesh>; other geometries (splines) have none.
@@ -224,13 +319,14 @@ class Collada {
   const XMLElement* root_ = nullptr;
   std::unordered_map<std::string_view, const XMLElement*> called_;
   std::vector<const XMLElement*> geometries_;
-  std::unordered_map<const XMLElement*, std::vector<Vector3d>> points_;
-  std::size_t points_shown_ = 0;
-  MeshBox box_;
+  MeshSink& sink_;
+  double meter_ = 1;
+  std::unordered_map<const XMLElement*, Shape> shapes_;
+  std::size_t points_shown_ = 0, triangles_shown_ = 0;
 };
 
 }  // namespace
 
-MeshBox collada_box(const std::string& file) { return Collada(file).box(); }
+void read_collada(const std::string& file, MeshSink& sink) { Collada(file, sink).read(); }
 
 }  // namespace linden

@@ -1,17 +1,18 @@
 // layout/collada.hpp
-// The box about what a COLLADA file shows; layout/mesh_box.hpp says what is read and what is not.
+// What a COLLADA file shows; layout/mesh_file.hpp says what is read and what is not.
 //
 //   <scene> -> <visual_scene> -> <node>, each within another: matrix, translate, rotate, scale, in the order they stand
 //           -> <instance_geometry>, <instance_node> -> <geometry><mesh><vertices> -> <source> of its positions
+//                                                           -> <triangles>, <polylist>, <polygons>, <tristrips>, <trifans> of these
 #pragma once
 
 #include <string>
 
-#include "layout/mesh_box.hpp"
+#include "layout/mesh_file.hpp"
 
 namespace linden {
 
 /// Throws InputError: `file: what was found; what was expected`.
-MeshBox collada_box(const std::string& file);
+void read_collada(const std::string& file, MeshSink& sink);
 
 }  // namespace linden

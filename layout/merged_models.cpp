@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <unordered_map>
 #include <unordered_set>
 
 #include "layout/input_error.hpp"
 #include "layout/mesh_path.hpp"
+#include "layout/origin_inertia.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
@@ -25,6 +27,11 @@ class Merger {
 
   Model run() {
     if (parts_.empty()) throw InputError("no models to merge; expected one or more; add a model");
+    for (const PlacedModel& part : parts_) {
+      if (part.pose.matrix().allFinite()) continue;
+      throw InputError(fmt::format("the pose of model {} is not finite; expected numbers; check its position and rotation", quoted(part.name)));
+    }
+    hang();
     sort_bodies();
     lay_out();
     for (std::size_t part = 0; part < parts_.size(); ++part) add_names_of_all(part);
@@ -38,22 +45,97 @@ class Merger {
     return parts_[part].name.empty() ? name : parts_[part].name + "/" + name;
   }
   Index slot_of(std::size_t part, Index slot) const { return new_slot_[part][static_cast<std::size_t>(slot)]; }
+  /// The same where slot 0 is what the model hangs from.
+  Index carrying_slot(std::size_t part, Index slot) const {
+    return slot == 0 ? slot_of(ground_[part].part, ground_[part].slot) : slot_of(part, slot);
+  }
+
+  /// What a model takes for the world: a body of another, or the world itself, and its pose there.
+  struct Ground {
+    std::size_t part = 0;
+    Index slot = 0;
+    Pose pose = Pose::Identity();
+  };
+
+  void hang() {
+    std::unordered_map<std::string, Ground> link_of;
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      for (const auto& [link, place] : parts_[part].model.names.link) link_of.emplace(prefixed(part, link), Ground{part, place.slot, place.in_body});
+    }
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      const std::string& parent = parts_[part].parent;
+      if (parent.empty()) {
+        ground_.push_back({part, 0, Pose::Identity()});
+        continue;
+      }
+      const auto found = link_of.find(parent);
+      if (found == link_of.end())
+        fail_to_hang(part, fmt::format("there is no link {}", quoted(parent)), "a link of another model", advice(parent, link_of));
+      ground_.push_back(found->second);
+      const Tree& tree = parts_[part].model.tree;
+      if (std::ranges::any_of(tree.roots(), [&](Index root) { return tree.kind(root) == JointKind::free; }))
+        fail_to_hang(part, "its base floats", "a fixed base", "write base: fixed, or let it stand in the world");
+    }
+    refuse_rings();
+    std::vector<bool> placed(parts_.size(), false);
+    for (std::size_t part = 0; part < parts_.size(); ++part) place_ground(part, placed);
+  }
+
+  /// No chain of models that hang from one another may come back to where it began.
+  void refuse_rings() const {
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      std::size_t at = part;
+      for (std::size_t count = 0; !parts_[at].parent.empty(); ++count) {
+        if (count == parts_.size()) fail_to_hang(part, "it hangs from itself", "a link of another model", "change one parent");
+        at = ground_[at].part;
+      }
+    }
+  }
+
+  /// From the link that a model hangs from to the body that carries it: what hangs from a link that is fixed to its model's world hangs
+  /// from what that hangs from.
+  void place_ground(std::size_t part, std::vector<bool>& placed) {
+    if (placed[part]) return;
+    Ground& ground = ground_[part];
+    if (!parts_[part].parent.empty() && ground.slot == 0) {
+      place_ground(ground.part, placed);
+      const Ground& below = ground_[ground.part];
+      ground = {below.part, below.slot, below.pose * ground.pose};
+    }
+    ground.pose = ground.pose * parts_[part].pose;
+    placed[part] = true;
+  }
+
+  template <class Links>
+  static std::string advice(const std::string& parent, const Links& link_of) {
+    std::vector<std::string> known;
+    for (const auto& [link, where] : link_of) known.push_back(link);
+    std::ranges::sort(known);
+    const std::string guess = nearest(parent, known);
+    return guess.empty() ? "write the model's name, a slash and the link" : fmt::format("did you mean {}?", quoted(guess));
+  }
+  [[noreturn]] void fail_to_hang(std::size_t part, const std::string& found, const char* expected, const std::string& what) const {
+    throw InputError(fmt::format("model {} hangs from {}: {}; expected {}; {}", quoted(parts_[part].name), quoted(parts_[part].parent), found,
+                                 expected, what));
+  }
 
   void sort_bodies() {
+    std::vector<Index> before;
+    Index count = 0;
+    for (const PlacedModel& part : parts_) {
+      before.push_back(count);
+      count += part.model.tree.bodies();
+    }
     std::vector<Origin> bodies;
     std::vector<Index> parent;
     std::vector<JointKind> kind;
     for (std::size_t part = 0; part < parts_.size(); ++part) {
       const Tree& tree = parts_[part].model.tree;
-      if (!parts_[part].pose.matrix().allFinite()) {
-        throw InputError(fmt::format("the pose of model {} is not finite; expected numbers; check its position and rotation",
-                                     quoted(parts_[part].name)));
-      }
       new_slot_.emplace_back(static_cast<std::size_t>(tree.shape.slots), 0);
-      const auto before = static_cast<Index>(bodies.size());
+      const auto body_of = [&](std::size_t of, Index slot) { return slot == 0 ? -1 : before[of] + slot - 1; };
       for (Index i = 1; i < tree.shape.slots; ++i) {
         bodies.push_back({part, i, tree.kind(i)});
-        parent.push_back(tree.parent(i) == 0 ? -1 : before + tree.parent(i) - 1);
+        parent.push_back(tree.parent(i) == 0 ? body_of(ground_[part].part, ground_[part].slot) : body_of(part, tree.parent(i)));
         kind.push_back(tree.kind(i));
       }
     }
@@ -68,7 +150,7 @@ class Merger {
     std::vector<Index> parent(1, 0);
     std::vector<JointKind> kind(1, JointKind::screw);
     for (const Origin& origin : order_) {
-      parent.push_back(slot_of(origin.part, model_of(origin).tree.parent(origin.slot)));
+      parent.push_back(carrying_slot(origin.part, model_of(origin).tree.parent(origin.slot)));
       kind.push_back(origin.kind);
     }
     Tree& tree = model_.tree = Tree::from_sorted(parent, kind);
@@ -78,13 +160,14 @@ class Merger {
     model_.names.body.assign(1, "world");
     model_.names.joint.assign(1, "");
     for (std::size_t k = 0; k < order_.size(); ++k) add_body(order_[k], static_cast<Index>(k) + 1);
+    for (std::size_t part = 0; part < parts_.size(); ++part) add_welded(part);
     sum_subtree_masses(tree, model_.constants);
   }
 
   void add_body(const Origin& origin, Index slot) {
     const Model& from = model_of(origin);
     copy_rows(from.constants, model_.constants, origin.slot, slot, 1);
-    if (from.tree.parent(origin.slot) == 0) place_root(parts_[origin.part].pose, slot);
+    if (from.tree.parent(origin.slot) == 0) place_root(ground_[origin.part].pose, slot);
     const Index old_v = from.tree.first_v(origin.slot), old_q = from.tree.first_q(origin.slot);
     copy_rows(from.attributes, model_.attributes, old_v, model_.tree.first_v(slot), velocity_count(origin.kind));
 
@@ -98,6 +181,18 @@ class Merger {
     for (Index k = 0; k < velocity_count(origin.kind); ++k) {
       names.velocity.push_back(prefixed(origin.part, from.names.velocity[static_cast<std::size_t>(old_v + k)]));
     }
+  }
+
+  /// What is fixed to a model's world becomes part of what that is.
+  void add_welded(std::size_t part) {
+    const Index slot = carrying_slot(part, 0);
+    const OriginInertia added = OriginInertia(parts_[part].model.welded.inertia).seen_from(Eigen::Isometry3d(ground_[part].pose));
+    std::array<double, 10> sum = model_.welded.inertia;
+    for (int k = 0; slot > 0 && k < 10; ++k) sum[static_cast<std::size_t>(k)] = model_.constants.inertia(slot, k);
+    OriginInertia whole(sum);
+    sum = (whole += added).numbers();
+    if (slot == 0) model_.welded.inertia = sum;
+    for (int k = 0; slot > 0 && k < 10; ++k) model_.constants.inertia(slot, k) = sum[static_cast<std::size_t>(k)];
   }
 
   /// Rows `from` on of every field of one structure to rows `to` on of another.
@@ -135,9 +230,9 @@ class Merger {
     const Model& from = parts_[part].model;
     for (const auto& [link, place] : from.names.link) {
       // what is fixed to the world moves with the model's idea of it
-      const Pose pose = place.slot == 0 ? parts_[part].pose * place.in_body : place.in_body;
+      const Pose pose = place.slot == 0 ? ground_[part].pose * place.in_body : place.in_body;
       const std::string name = prefixed(part, link);
-      if (!model_.names.link.emplace(name, LinkPlace{slot_of(part, place.slot), pose}).second) fail("links", name);
+      if (!model_.names.link.emplace(name, LinkPlace{carrying_slot(part, place.slot), pose}).second) fail("links", name);
     }
     for (const auto& [joint, slot] : from.names.slot_of_joint) {
       const std::string name = prefixed(part, joint);
@@ -149,9 +244,9 @@ class Merger {
       model_.mimics.push_back({follower, leader, tree.first_v(follower), tree.first_v(leader), tree.first_q(follower),
                                tree.first_q(leader), mimic.multiplier, mimic.offset});
     }
-    for (const std::string& warning : from.warnings) {
-      model_.warnings.push_back(parts_[part].name.empty() ? warning : parts_[part].name + ": " + warning);
-    }
+    const auto said = [&](const std::string& text) { return parts_[part].name.empty() ? text : parts_[part].name + ": " + text; };
+    for (const std::string& warning : from.warnings) model_.warnings.push_back(said(warning));
+    for (const std::string& note : from.notes) model_.notes.push_back(said(note));
   }
 
   void add_shapes() {
@@ -160,13 +255,16 @@ class Merger {
     if (one_source) model_.source = source;
     for (std::size_t part = 0; part < parts_.size(); ++part) {
       const Model& from = parts_[part].model;
-      for (BodyShape shape : from.shapes) {
-        shape.slot = slot_of(part, shape.slot);
-        shape.link = prefixed(part, shape.link);
-        if (!one_source && shape.shape.kind == ShapeKind::mesh) {
-          if (const std::optional<std::string> file = find_mesh(shape.shape.mesh, from.source)) shape.shape.mesh = *file;
+      for (const std::vector<BodyShape>* shapes : {&from.shapes, &from.welded.shapes}) {
+        for (BodyShape shape : *shapes) {
+          if (shape.slot == 0) shape.pose = ground_[part].pose * shape.pose;
+          shape.slot = carrying_slot(part, shape.slot);
+          shape.link = prefixed(part, shape.link);
+          if (!one_source && shape.shape.kind == ShapeKind::mesh) {
+            if (const std::optional<std::string> file = find_mesh(shape.shape.mesh, from.source)) shape.shape.mesh = *file;
+          }
+          (shape.slot == 0 ? model_.welded.shapes : model_.shapes).push_back(std::move(shape));
         }
-        model_.shapes.push_back(std::move(shape));
       }
     }
     std::ranges::stable_sort(model_.shapes, {}, &BodyShape::slot);
@@ -178,6 +276,7 @@ class Merger {
   }
 
   const std::vector<PlacedModel>& parts_;
+  std::vector<Ground> ground_;  // [part]
   std::vector<Origin> order_;
   std::vector<std::vector<Index>> new_slot_;  // [part][slot]
   std::unordered_set<std::string> coordinates_;

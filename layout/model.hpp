@@ -2,6 +2,7 @@
 // A tree ready to be simulated: topology, constants, names. Immutable once built; shared by any number of simulations.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,15 @@
 
 namespace linden {
 
+/// What is fixed to the world, in its frame: it moves nothing and is no part of subtree_mass, but where the model is hung from a link that
+/// moves (layout/merged_models.hpp).
+struct Welded {
+  std::array<double, 10> inertia{};  // m [kg], m c [kg m], xx xy xz yy yz zz about the origin [kg m^2]
+  std::vector<BodyShape> shapes;     // of slot 0
+
+  double mass() const { return inertia[0]; }
+};
+
 struct Model {
   Tree tree;
   BodyConstants<double> constants;
@@ -22,6 +32,8 @@ struct Model {
   std::string source;                 // file it was read from, which names of meshes are relative to; empty = made in code
   std::vector<BodyShape> shapes;      // sorted by slot; none of slot 0
   std::vector<std::string> warnings;  // what the source said that was read with a grain of salt
+  std::vector<std::string> notes;     // what was done because it was asked for, such as mass from a density
+  Welded welded;                      // links fixed to the world
 
   /// Free coordinates: velocities less the mimic joints.
   Index degrees_of_freedom() const { return tree.shape.velocities - static_cast<Index>(mimics.size()); }

@@ -5,6 +5,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
+#include <span>
 
 #include "layout/builder.hpp"
 
@@ -22,6 +24,16 @@ struct OriginInertia {
     moment = mass * center;
     about_origin = frame.linear() * link.about_center * frame.linear().transpose() + parallel_axis(mass, center);
     about_origin = (0.5 * (about_origin + about_origin.transpose())).eval();
+  }
+
+  /// m, m c, and xx xy xz yy yz zz about the origin, as models keep it.
+  explicit OriginInertia(std::span<const double, 10> numbers)
+      : mass(numbers[0]), moment(numbers[1], numbers[2], numbers[3]) {
+    about_origin << numbers[4], numbers[5], numbers[6], numbers[5], numbers[7], numbers[8], numbers[6], numbers[8], numbers[9];
+  }
+  std::array<double, 10> numbers() const {
+    const Eigen::Matrix3d& I = about_origin;
+    return {mass, moment[0], moment[1], moment[2], I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
   }
 
   OriginInertia& operator+=(const OriginInertia& other) {

@@ -6,9 +6,11 @@
 
 #include <cmath>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "layout/shape_mass.hpp"
 #include "layout/text_file.hpp"
 #include "layout/urdf_check.hpp"
 #include "layout/words.hpp"
@@ -194,21 +196,25 @@ Model built(const TreeBuilder& builder, const std::string& suspect) {
 
 }  // namespace
 
-Model load_urdf(const std::string& file, Base base, Reading reading) {
-  return parse_urdf(read_text(file, "a URDF file"), file, base, reading);
+Model load_urdf(const std::string& file, Base base, Reading reading, std::optional<double> density) {
+  return parse_urdf(read_text(file, "a URDF file"), file, base, reading, density);
 }
 
-Model parse_urdf(const std::string& xml, const std::string& source_name, Base base, Reading reading) {
-  CheckedUrdf checked = check_urdf(xml, source_name);
+Model parse_urdf(const std::string& xml, const std::string& source_name, Base base, Reading reading,
+                 std::optional<double> density) {
+  std::optional<ShapeMass> mass;
+  if (density) mass.emplace(*density, source_name);
+  CheckedUrdf checked = check_urdf(xml, source_name, density.has_value());
   const Robot robot(checked.xml, source_name);
   TreeBuilder builder(robot->getName());
   builder.source(source_name);
   for (const std::string& warning : checked.warnings) builder.warn(warning);
-  const auto add = [&](LinkSpec spec) {
+  const auto add = [&](LinkSpec spec, const urdf::Link& link) {
     if (const auto found = checked.shapes.find(spec.name); found != checked.shapes.end()) spec.shapes = std::move(found->second);
+    if (mass && !link.inertial) spec.inertia = mass->of(spec.name, spec.shapes, checked.visuals[spec.name]);
     builder.add(std::move(spec));
   };
-  add(root_spec(robot, base));
+  add(root_spec(robot, base), *robot->root_link_);
   bool moves = base == Base::floating;
   for (const std::string& name : checked.joints) {
     const urdf::JointConstSharedPtr joint = robot->getJoint(name);
@@ -217,14 +223,19 @@ Model parse_urdf(const std::string& xml, const std::string& source_name, Base ba
       throw InputError(
           fmt::format("{}: urdfdom lost joint {}; expected plain text in names; rename it", source_name, quoted(name)));
     moves = moves || joint->type != urdf::Joint::FIXED;
-    add(spec_of(*joint, *link));
+    add(spec_of(*joint, *link), *link);
   }
   if (!moves) {
     throw InputError(fmt::format("{}: nothing moves: the robot is one rigid body, fixed to the world; expected a joint that moves; let its "
                                  "base float by --base floating",
                                  source_name));
   }
-  Model model = built(builder, checked.suspect);
+  if (mass) {
+    for (const std::string& trouble : mass->troubles()) builder.warn(trouble);
+    builder.note(mass->note());
+  }
+  const bool mesh_missing = mass && !mass->troubles().empty();
+  Model model = built(builder, mesh_missing ? mass->troubles().front() : checked.suspect);
   if (reading == Reading::strict) refuse_warnings(model);
   return model;
 }

@@ -6,10 +6,11 @@
 //   prismatic, fixed, planar                the same; the normal of the plane is the axis
 //   floating                                free
 //   inertial at any origin, turned          turned into the link's axes
-//   link without inertial                   massless
+//   link without inertial                   massless; where a density is given, with the mass of its shapes (layout/shape_mass.hpp)
 //   limit, dynamics, mimic                  limits, damping and friction, mimic
 //   collision shapes                        shapes; meshes by name only, their files are not opened
-//   visuals, sensors, all else              not read; what a reader should know of it is told (layout/urdf_vocabulary.hpp)
+//   visuals                                 read where a density is given and a link has neither inertial nor collision shapes
+//   sensors, all else                       not read; what a reader should know of it is told (layout/urdf_vocabulary.hpp)
 //
 // A tree has one root link. With Base::fixed it is fixed to the world. With Base::floating a free joint called "base"
 // carries it, unless the file itself lets its robot float: where the root, with all that is fixed to it, has no mass
@@ -22,6 +23,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "layout/builder.hpp"
@@ -34,10 +36,12 @@ enum class Base : std::uint8_t { fixed, floating };
 enum class Reading : std::uint8_t { lenient, strict };
 
 /// Reads a URDF file. Throws InputError: `file:line: what was found; what was expected; what to do`.
-Model load_urdf(const std::string& file, Base base = Base::fixed, Reading reading = Reading::lenient);
+/// `density` [kg/m^3]: of links that have shapes and no <inertial>, which get mass and inertia by it; what became of them is in Model::notes.
+Model load_urdf(const std::string& file, Base base = Base::fixed, Reading reading = Reading::lenient,
+                std::optional<double> density = std::nullopt);
 
 /// The same from memory; `source_name` stands for the file in messages. Threads may call both at once.
 Model parse_urdf(const std::string& xml, const std::string& source_name, Base base = Base::fixed,
-                 Reading reading = Reading::lenient);
+                 Reading reading = Reading::lenient, std::optional<double> density = std::nullopt);
 
 }  // namespace linden

@@ -238,13 +238,14 @@ class Writer {
 
 }  // namespace
 
-CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name) {
+CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name, bool visuals) {
   UrdfReport report{source_name, {}, {}};
   const UrdfStructure robot(xml, report);
   CheckedUrdf result;
   result.xml = Writer(robot, report).run();
   for (const UrdfLink& link : robot.links()) {
     if (std::vector<LinkShape> shapes = shapes_of(link, report); !shapes.empty()) result.shapes[link.name] = std::move(shapes);
+    if (visuals && !link.element->FirstChildElement("inertial")) result.visuals[link.name] = shapes_of(link, report, "visual");
   }
   for (const UrdfJoint& joint : robot.joints()) result.joints.push_back(joint.name);
   result.warnings = std::move(report.warnings);

@@ -18,14 +18,14 @@ class Reader {
  public:
   Reader(const UrdfLink& link, UrdfReport& report) : owner_("link " + quoted(link.name)), report_(report), numbers_(report) {}
 
-  std::optional<LinkShape> read(const XMLElement& collision) {
-    const XMLElement* geometry = collision.FirstChildElement("geometry");
+  std::optional<LinkShape> read(const XMLElement& holder) {
+    const XMLElement* geometry = holder.FirstChildElement("geometry");
     for (const XMLElement* element = geometry ? geometry->FirstChildElement() : nullptr; element; element = element->NextSiblingElement()) {
-      if (std::optional<CollisionShape> shape = shape_of(*element)) return LinkShape{pose_of(collision), std::move(*shape)};
+      if (std::optional<CollisionShape> shape = shape_of(*element)) return LinkShape{pose_of(holder), std::move(*shape)};
     }
     // a shape that is not known has been told already
     if (!geometry || !geometry->FirstChildElement()) {
-      report_.warn(collision.GetLineNum(), fmt::format("{}: a <collision> holds no shape; left out", owner_));
+      report_.warn(holder.GetLineNum(), fmt::format("{}: a <{}> holds no shape; left out", owner_, holder.Name()));
     }
     return std::nullopt;
   }
@@ -71,9 +71,9 @@ class Reader {
     return {ShapeKind::mesh, scaled ? numbers_.three(owner_, element, "scale") : std::array<double, 3>{1, 1, 1}, file.Value()};
   }
 
-  Pose pose_of(const XMLElement& collision) const {
+  Pose pose_of(const XMLElement& holder) const {
     Pose pose = Pose::Identity();
-    const XMLElement* origin = numbers_.origin(owner_, collision);
+    const XMLElement* origin = numbers_.origin(owner_, holder);
     if (!origin) return pose;
     if (origin->FindAttribute("xyz")) {
       const std::array<double, 3> xyz = numbers_.three(owner_, *origin, "xyz");
@@ -96,13 +96,13 @@ class Reader {
 
 }  // namespace
 
-std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report) {
+std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report, const char* tag) {
   std::vector<LinkShape> shapes;
-  const XMLElement* collision = link.element->FirstChildElement("collision");
-  if (!collision) return shapes;
+  const XMLElement* holder = link.element->FirstChildElement(tag);
+  if (!holder) return shapes;
   Reader reader(link, report);
-  for (; collision; collision = collision->NextSiblingElement("collision")) {
-    if (std::optional<LinkShape> shape = reader.read(*collision)) shapes.push_back(std::move(*shape));
+  for (; holder; holder = holder->NextSiblingElement(tag)) {
+    if (std::optional<LinkShape> shape = reader.read(*holder)) shapes.push_back(std::move(*shape));
   }
   return shapes;
 }

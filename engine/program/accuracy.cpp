@@ -323,6 +323,7 @@ class Measurement {
     reference.gap = over_all ? found.gap_at_end : found.gap;
     reference.horizon = static_cast<double>(judged_) * every_;
     reference.kinetic = ours.energy.scale();
+    figures_.moves = is_motion(*setup_.model, reference.kinetic);
     if (judged_ == 0) {
       reference.failure = fmt::format("{} and {} part within {:.3g} s, at the smallest steps that the time allowed", name(reference.method),
                                       name(reference.other), every_);

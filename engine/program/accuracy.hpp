@@ -95,6 +95,7 @@ struct AccuracyFigures {
   AccuracyReference reference;
   std::vector<AccuracyRow> rows;
   bool interrupted = false;
+  bool moves = true;  // else there is nothing to be accurate about
 
   bool chaotic() const { return reference.horizon < duration; }
 };

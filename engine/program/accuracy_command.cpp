@@ -11,6 +11,7 @@
 #include "engine/program/accuracy_report.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
+#include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
@@ -62,6 +63,7 @@ AccuracyFigures measure(const AccuracySetup& setup, const Interrupt& interrupt, 
 int accuracy_command(const AccuracyArguments& arguments) {
   const AccuracySetup setup = setup_of(arguments, checked_outputs(arguments));
   print_warnings(*setup.model);
+  look_at_start(arguments, *setup.model, arguments.options);
   const Interrupt interrupt;
   int signal = 0;
   const AccuracyFigures figures = measure(setup, interrupt, signal);

@@ -97,6 +97,7 @@ plot::Chart chart_of(const AccuracyFigures& figures, double AccuracyRow::*value)
 
 std::vector<std::string> accuracy_advice(const AccuracyFigures& figures) {
   std::vector<std::string> lines;
+  if (!figures.moves) return {"none: nothing moves, so every step and order is as good; give it a velocity or a force"};
   for (const double target : kTargets) {
     // what is closer than the reference itself cannot be promised
     if (target > figures.reference.gap) lines.push_back(advice_for(figures, &AccuracyRow::error, target, "an error"));

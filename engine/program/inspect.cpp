@@ -63,11 +63,39 @@ struct BodyFacts {
   JointKind kind;
   Index first_q, first_v;
   double pitch, mass, lower, upper;
+  std::array<double, 3> axis;  // of a screw, in the frame of the link that the parent body is called after
+  bool massless;
+  const Mimic* follows;  // null: it leads itself
 };
+
+/// Direction of a screw's axis in the frame of the link that its parent body is called after, which the joint does not turn. The massless bodies within planar joints have
+/// no link: their own frame serves.
+std::array<double, 3> axis_of(const Model& model, Index slot) {
+  const auto& X = model.constants.tree_placement;
+  Eigen::Vector3d axis(X(slot, 2), X(slot, 5), X(slot, 8));
+  const Index parent = model.tree.parent(slot);
+  const auto link = model.names.link.find(model.names.body[static_cast<std::size_t>(parent)]);
+  if (parent != 0 && link != model.names.link.end()) axis = link->second.in_body.linear().transpose() * axis;
+  constexpr double kRounding = 1e-12;
+  std::array<double, 3> result{axis.x(), axis.y(), axis.z()};
+  for (double& part : result) {
+    if (std::abs(part - std::round(part)) < kRounding) part = std::round(part) + 0.0;
+  }
+  return result;
+}
+
+bool is_massless(const Model& model, Index slot) {
+  for (int k = 0; k < 10; ++k) {
+    if (model.constants.inertia(slot, k) != 0) return false;
+  }
+  return true;
+}
 
 std::vector<BodyFacts> bodies_of(const Model& model) {
   const Tree& tree = model.tree;
   const auto name = [](const std::vector<std::string>& names, Index slot) { return names[static_cast<std::size_t>(slot)]; };
+  std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.shape.slots), nullptr);
+  for (const Mimic& mimic : model.mimics) follows[static_cast<std::size_t>(mimic.follower_slot)] = &mimic;
   std::vector<BodyFacts> bodies;
   for (const Run& run : tree.runs) {
     for (Index i = run.begin; i < run.end; ++i) {
@@ -84,7 +112,10 @@ std::vector<BodyFacts> bodies_of(const Model& model) {
                         .pitch = model.constants.screw(i, 1),
                         .mass = model.constants.inertia(i, 0),
                         .lower = model.attributes.lower(v),
-                        .upper = model.attributes.upper(v)});
+                        .upper = model.attributes.upper(v),
+                        .axis = axis_of(model, i),
+                        .massless = is_massless(model, i),
+                        .follows = follows[static_cast<std::size_t>(i)]});
     }
   }
   return bodies;
@@ -167,13 +198,16 @@ class Printer {
     std::vector<std::string> kinds;
     for (const auto& [motion, count] : counts_of(bodies_)) kinds.push_back(fmt::format("{} {}", grouped(count), motion));
     row("model", printable(model_.names.model) + ", " + base_of(model_));
-    row("bodies", fmt::format("{}: joints {}", grouped(tree.bodies()), fmt::join(kinds, ", ")));
+    const auto massless = static_cast<std::int64_t>(std::ranges::count(bodies_, true, &BodyFacts::massless));
+    row("bodies", fmt::format("{}: joints {}{}", grouped(tree.bodies()), fmt::join(kinds, ", "),
+                              massless == 0 ? "" : fmt::format("; {} massless", grouped(massless))));
     const auto followers = static_cast<std::int64_t>(model_.mimics.size());
     const std::string mimics = followers == 0 ? "" : fmt::format(" less {}", counted(followers, "mimic joint"));
     row("freedom", fmt::format("{} of freedom; {} in q, {} in v{}", counted(model_.degrees_of_freedom(), "degree"),
                                counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics));
     row("mass", fmt::format("{:.6g} kg; centre of mass ({:.6g}, {:.6g}, {:.6g}) m in the zero configuration", masses.mass,
                             masses.center.x(), masses.center.y(), masses.center.z()));
+    if (model_.welded.mass() > 0) row("", fmt::format("{:.6g} kg of links fixed to the world beside it, which move nothing", model_.welded.mass()));
     row("tree", fmt::format("{}, up to {} wide; {} of one joint kind", counted(tree.levels() - 1, "level"),
                             counted(widest_level(tree), "body"), counted(static_cast<std::int64_t>(tree.runs.size()), "run")));
     row("memory", fmt::format("state {}, constants {}, workspace {}", memory_text(bytes_for<State<double>>(tree.shape)),
@@ -210,10 +244,12 @@ class Printer {
                  {"limits", Align::left}});
     for (const BodyFacts& body : std::span(bodies_).first(shown(bodies_.size()))) {
       const bool screw = body.kind == JointKind::screw;
-      const std::string axis = !screw ? "-" : body.motion == "helical" ? fmt::format("helical {:.3g} m/rad", body.pitch) : body.motion;
+      const std::string pitch = body.motion == "helical" ? fmt::format(", {:.3g} m/rad", body.pitch) : "";
+      const std::string axis =
+          !screw ? "-" : fmt::format("{} {:.4g} {:.4g} {:.4g}{}", body.motion, body.axis[0], body.axis[1], body.axis[2], pitch);
       table.add({fmt::format("{}", body.slot), body.body, fmt::format("{} {}", body.parent, body.parent_body), body.joint,
-                 std::string(kind_name(body.kind)), axis, rows_text(body.first_q, position_count(body.kind)),
-                 rows_text(body.first_v, velocity_count(body.kind)), fmt::format("{:.4g}", body.mass),
+                 fmt::format("{}{}", kind_name(body.kind), body.follows ? ", tied" : ""), axis, rows_text(body.first_q, position_count(body.kind)),
+                 rows_text(body.first_v, velocity_count(body.kind)), body.massless ? "massless" : fmt::format("{:.4g}", body.mass),
                  screw ? limits_text(body.lower, body.upper, body.motion != "prismatic") : "-"});
     }
     say_text(table.text("  "));
@@ -232,6 +268,7 @@ class Printer {
                  "body's frame\n");
     }
     say("  A quaternion turns body coordinates to the parent's. A body's frame sits at its joint, the axis of a screw along z.\n");
+    say("  Axes above: x y z in the frame of the link that the parent is called after. A tied joint follows another, as listed below.\n");
   }
 
   void merged() const {
@@ -286,6 +323,8 @@ class Printer {
   }
 
   void warnings() const {
+    if (!model_.notes.empty()) say("\nnotes\n");
+    for (const std::string& note : model_.notes) say("  {}\n", printable(note));
     if (model_.warnings.empty()) return;
     say("\nwarnings\n");
     for (const std::string& warning : model_.warnings) say("  {}\n", printable(warning));
@@ -312,6 +351,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
               {"positions", tree.shape.positions},
               {"velocities", tree.shape.velocities},
               {"mass", masses.mass},
+              {"welded_mass", model.welded.mass()},
               {"center_of_mass", {masses.center.x(), masses.center.y(), masses.center.z()}},
               {"levels", tree.levels() - 1},
               {"widest_level", widest_level(tree)},
@@ -333,6 +373,9 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
                      {"kind", kind_name(body.kind)},
                      {"motion", body.motion},
                      {"pitch", body.pitch},
+                     {"axis", body.kind == JointKind::screw ? Json(body.axis) : Json(nullptr)},
+                     {"follows", body.follows ? Json(name(model.names.joint, body.follows->leader_slot)) : Json(nullptr)},
+                     {"massless", body.massless},
                      {"first_q", body.first_q},
                      {"first_v", body.first_v},
                      {"rows_q", position_count(body.kind)},
@@ -374,6 +417,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
     result["initial"] = {{"positions", scene.initial.positions}, {"velocities", scene.initial.velocities}};
   }
   result["warnings"] = model.warnings;
+  result["notes"] = model.notes;
   return result;
 }
 

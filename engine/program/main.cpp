@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <new>
 #include <optional>
@@ -36,7 +37,7 @@ namespace {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      what, shape, dofs, steps, budget;
+      what, shape, dofs, steps, budget, start, density;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -56,6 +57,15 @@ std::array<double, 3> gravity_from(const std::string& text) {
   return gravity;
 }
 
+std::optional<double> density_from(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const double density = number_from("--density", text, "kg/m^3, such as 1000");
+  if (!(density > 0) || !std::isfinite(density)) {
+    throw InputError(fmt::format("--density {}: expected a finite number above zero [kg/m^3], such as 1000", text));
+  }
+  return density;
+}
+
 void read_model_options(const Texts& texts, std::optional<Base>& base, Options& options) {
   if (!texts.base.empty()) base = base_from(texts.base);
   if (!texts.gravity.empty()) options.gravity = gravity_from(texts.gravity);
@@ -63,6 +73,12 @@ void read_model_options(const Texts& texts, std::optional<Base>& base, Options& 
 
 void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
   read_model_options(texts, motion.base, options);
+  motion.density = density_from(texts.density);
+  motion.gravity_given = !texts.gravity.empty();
+  if (!texts.start.empty() && texts.start != "as-given" && texts.start != "checked") {
+    throw InputError(fmt::format("--start {}: expected checked or as-given", texts.start));
+  }
+  motion.start_as_given = texts.start == "as-given";
   if (!texts.duration.empty()) motion.duration = number_from("--duration", texts.duration, "seconds, such as 10");
   if (!texts.dt.empty()) options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
   if (!texts.tolerance.empty()) {
@@ -86,9 +102,11 @@ void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
     throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", arguments.model));
   }
   SceneStart start;
+  start.density = arguments.density;
   if constexpr (std::is_base_of_v<MotionArguments, Arguments> && !std::is_same_v<Arguments, RolloutArguments>) {
     if (arguments.spread) check_spread(*arguments.spread);
-    start = {arguments.seed, arguments.spread};
+    start.seed = arguments.seed;
+    start.spread = arguments.spread;
   }
   arguments.scene = std::make_shared<const Scene>(load_scene(arguments.model, start));
   options = arguments.scene->options;
@@ -159,7 +177,10 @@ void read_accuracy_options(const Texts& texts, AccuracyArguments& accuracy) {
 }
 
 void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
-  read_over_scene(inspect, inspect.options, [&] { read_model_options(texts, inspect.base, inspect.options); });
+  read_over_scene(inspect, inspect.options, [&] {
+    read_model_options(texts, inspect.base, inspect.options);
+    inspect.density = density_from(texts.density);
+  });
   if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
 }
 
@@ -184,6 +205,9 @@ struct Adding {
   void base(const char* group, Texts& texts) const {
     (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
   }
+  void density(const char* group, Texts& texts) const {
+    (*this)(group, "--density", texts.density, "D", "[kg/m^3] give links of a URDF without inertia the mass of their shapes, such as 1000");
+  }
   void strict(const char* group, bool& strict) const {
     command->add_flag("--strict", strict, "refuse a model or scene that gives warnings")->group(group);
   }
@@ -195,6 +219,9 @@ struct Adding {
   void spread(const char* group, Texts& texts) const {
     (*this)(group, "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
   }
+  void start(const char* group, Texts& texts) const {
+    (*this)(group, "--start", texts.start, "RULE", "checked (default): a scene may not begin outside limits or in the ground; or as-given");
+  }
 };
 
 CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
@@ -202,12 +229,14 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   const Adding add{command};
   add.model(run.model, kSceneHelp);
   add.base("Motion", texts);
+  add.density("Motion", texts);
   add.strict("Motion", run.strict);
   add.duration(texts);
   add.step(texts);
   add.gravity("Motion", texts);
   add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
   add.spread("Start", texts);
+  add.start("Start", texts);
   add("Start", "--load", run.load, "FILE", "continue from a checkpoint");
   add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
@@ -242,7 +271,9 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
   add.spread("Instances", texts);
+  add.start("Instances", texts);
   add.base("Motion", texts);
+  add.density("Motion", texts);
   add.strict("Motion", rollout.strict);
   add.duration(texts);
   add.step(texts);
@@ -294,12 +325,14 @@ CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accur
   const Adding add{command};
   add.model(accuracy.model, kSceneHelp);
   add.base("Motion", texts);
+  add.density("Motion", texts);
   add.strict("Motion", accuracy.strict);
   add.duration(texts);
   add("Motion", "--dt", texts.dt, "S", "steps from 16 times to a quarter of this are tried, default 1e-3");
   add.gravity("Motion", texts);
   add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
   add.spread("Start", texts);
+  add.start("Start", texts);
   add("Study", "--budget", texts.budget, "S", "seconds that all of it may take, default 60");
   add("Output", "--json", accuracy.json, "FILE.json", "rows, fits and advice, for scripts");
   add("Output", "--plot", accuracy.plot, "FILE.svg|png", "error and energy over CPU time");
@@ -318,6 +351,7 @@ CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect
   const Adding add{command};
   add.model(inspect.model, kSceneHelp);
   add.base("Options", texts);
+  add.density("Options", texts);
   add.strict("Options", inspect.strict);
   add.gravity("Options", texts);
   add("Options", "--solver", texts.solver, "NAME", "newton (default) or riqn");

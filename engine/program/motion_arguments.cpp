@@ -25,7 +25,7 @@ std::shared_ptr<const Model> ModelArguments::loaded(const Outputs& outputs) cons
   if (scene) {
     result = {scene, &scene->model};
   } else {
-    result = std::make_shared<const Model>(load_model(model, base));
+    result = std::make_shared<const Model>(load_model(model, base, density));
   }
   outputs.spare(scene ? scene->files : files.names());
   if (strict) refuse_warnings(*result);

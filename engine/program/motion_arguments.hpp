@@ -17,6 +17,7 @@ namespace linden {
 struct ModelArguments {
   std::string model;  // as it was given: a file, a generator with its size, a scene
   std::optional<Base> base;
+  std::optional<double> density;  // of links without inertia [kg/m^3]
   bool strict = false;  // a model that gives warnings is refused
   std::shared_ptr<const Scene> scene;  // that `model` names; null: it names a model
 
@@ -29,6 +30,8 @@ struct MotionArguments : ModelArguments {
   double duration = 10;  // [s]
   std::optional<std::uint64_t> seed;
   std::optional<double> spread;
+  bool start_as_given = false;  // no start is refused
+  bool gravity_given = false;   // beside the scene
 };
 
 /// Seed and spread as they are used; nothing where neither was given.

@@ -19,6 +19,7 @@
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/program/rollout_report.hpp"
+#include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
@@ -61,10 +62,14 @@ class Execution {
     const Randomness random = *randomness(arguments);
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
       const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
-      const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread)
+      const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread, arguments.scene->effects.limits)
                                                  : random_state(batch_.model(), seed, random.spread);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
+    });
+    look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
+      const auto rows = batch_.positions().instance(i);
+      return std::vector<double>(rows.begin(), rows.end());
     });
     figures_.bytes = batch_.bytes();
     if (!arguments.record.empty()) {
@@ -231,6 +236,7 @@ int rollout_command(const RolloutArguments& given) {
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
   const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
+  look_at_start(arguments, *model, arguments.options);
   return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
 }
 

@@ -143,6 +143,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"recording_failure", figures.lost.empty() ? Json(nullptr) : Json(figures.lost)},
       {"interrupted", figures.signal != 0},
       {"warnings", model.warnings},
+      {"notes", model.notes},
   };
 }
 

@@ -19,6 +19,7 @@
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/program/run_report.hpp"
+#include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
@@ -235,6 +236,7 @@ int run_command(const RunArguments& arguments) {
 
   const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
+  if (arguments.load.empty()) look_at_start(arguments, *model, arguments.options);
   Simulation simulation(model, arguments.options, arguments.effects());
   begin_run(arguments, simulation);
 

@@ -104,6 +104,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   }
 
   const EnergyDrift& energy = figures.energy;
+  if (!is_motion(model, energy.scale())) row("motion", kNothingMoves);
   row("energy", fmt::format("{:.6g} J at the start; kinetic energy up to {:.4g} J", energy.initial(), energy.scale()));
   if (!effect_lines(effects, model).empty()) {
     row("  work", fmt::format("effects took {:.6g} J and gave {:.6g} J, which the band below accounts for", figures.taken, figures.given));
@@ -193,6 +194,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"split_steps", figures.run.split_steps},
       {"rounding_floor_steps", figures.run.floor_steps},
       {"residual_max", figures.run.largest_residual},
+      {"moves", is_motion(model, energy.scale())},
       {"energy_initial", energy.initial()},
       {"energy_taken", figures.taken},
       {"energy_given", figures.given},
@@ -215,6 +217,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"interrupted", figures.signal != 0},
       {"advice", if_given(fmt::format("{}", fmt::join(energy_warnings(simulation, energy), "; ")))},
       {"warnings", model.warnings},
+      {"notes", model.notes},
   };
 }
 

@@ -58,12 +58,13 @@ Base base_from(const std::string& text) {
   throw InputError(fmt::format("--base \"{}\" is not known; choose one of: fixed, floating", text));
 }
 
-Model load_model(const std::string& name, std::optional<Base> base) {
+Model load_model(const std::string& name, std::optional<Base> base, std::optional<double> density) {
   if (is_scene(name)) {
     throw InputError(
         fmt::format("{}: scenes are for linden run, rollout, accuracy and inspect; expected a model here; give a URDF file or chain:3", name));
   }
-  if (!is_generated(name)) return load_urdf(name, base.value_or(Base::fixed));
+  if (!is_generated(name)) return load_urdf(name, base.value_or(Base::fixed), Reading::lenient, density);
+  if (density) throw InputError(fmt::format("--density is for URDF files; {} is generated, mass and all: leave --density out", name));
   if (base) throw InputError(fmt::format("--base is for URDF files; {} is generated, base and all: leave --base out", name));
   check_memory(name);
   return generate(name);
@@ -84,6 +85,7 @@ void print_warnings(const Model& model) {
   if (model.warnings.size() > kShown) {
     tell("warning: and {} more (linden inspect shows all)", model.warnings.size() - kShown);
   }
+  for (const std::string& note : model.notes) fmt::print(stderr, "linden: note: {}\n", printable(note));
 }
 
 }  // namespace linden

@@ -12,7 +12,8 @@ namespace linden {
 
 /// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N. `base` is for URDF files (fixed where it is not
 /// given); throws InputError where it is given for a generated model, for a scene, and for whatever cannot be read.
-Model load_model(const std::string& name, std::optional<Base> base);
+/// `density` [kg/m^3]: for URDF files too, of links without inertia (layout/urdf.hpp).
+Model load_model(const std::string& name, std::optional<Base> base, std::optional<double> density = std::nullopt);
 
 /// More memory is asked for than there is.
 class MemoryError : public InputError {
@@ -35,7 +36,7 @@ Base base_from(const std::string& text);
 /// How the model hangs on to the world, in words: "fixed base", "floating base", "2 of 3 roots float".
 std::string base_of(const Model& model);
 
-/// The model's warnings on stderr, the first five of them.
+/// The model's warnings on stderr, the first five of them, and its notes.
 void print_warnings(const Model& model);
 
 }  // namespace linden

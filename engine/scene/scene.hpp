@@ -19,6 +19,8 @@ struct Scene {
   InitialState initial;   // positions [nq], velocities [nv]; empty: at rest in the zero configuration
   Effects effects;
   std::vector<std::string> files{};  // that it was read from: scene, models, meshes, tables
+  bool start_as_given = false;       // begins wherever `initial` says: no look at limits, ties and ground (engine/start_check.hpp)
+  bool gravity_named = true;         // whether to have gravity or none was decided; a scene file may not say
 };
 
 }  // namespace linden

@@ -62,6 +62,11 @@ class Reader {
     for (const Mimic& mimic : model.mimics) leader_of_[mimic.follower_slot] = mimic.leader_slot;
   }
 
+  std::vector<JointLimit> read_limits(const SceneValue& at) {
+    if (const auto value = at.find("limits")) limits(*value);
+    return std::move(result_.effects.limits);
+  }
+
   SceneEffects read(const SceneValue& at) {
     if (at.is(Kind::nothing)) return {};
     for (const auto& [key, value] : at.entries_of(kEffects)) {
@@ -587,6 +592,8 @@ class Reader {
 }  // namespace
 
 const std::vector<std::string>& effect_keys() { return kEffects; }
+
+std::vector<JointLimit> read_limits(const SceneValue& at, const Model& model) { return Reader(model, {}, "").read_limits(at); }
 
 SceneEffects read_effects(const SceneValue& at, const Model& model, const std::vector<double>& start, const std::string& folder) {
   return Reader(model, start, folder).read(at);

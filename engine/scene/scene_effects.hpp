@@ -42,6 +42,9 @@ struct SceneEffects {
 /// Names of the effects that a scene can have.
 const std::vector<std::string>& effect_keys();
 
+/// Of these the limits alone, which random starts keep; what is wrong in the rest is not looked at.
+std::vector<JointLimit> read_limits(const SceneValue& at, const Model& model);
+
 /// `start`: positions [nq] that servos hold where no target is given; `folder`: of the scene, empty for the current one. Throws
 /// InputError with file and line.
 SceneEffects read_effects(const SceneValue& at, const Model& model, const std::vector<double>& start, const std::string& folder);

@@ -12,8 +12,10 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_effects.hpp"
 #include "engine/scene/scene_yaml.hpp"
+#include "engine/start_check.hpp"
 #include "engine/step/effect_plan.hpp"
 #include "layout/merged_models.hpp"
+#include "layout/smooth_curve.hpp"
 #include "layout/text_file.hpp"
 #include "layout/words.hpp"
 #include "models/generators.hpp"
@@ -24,10 +26,13 @@ namespace {
 using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
-                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "effects"};
-const std::vector<std::string> kModel{"model",    "base",       "name",     "position",
-                                      "rotation", "quaternion", "velocity", "angular_velocity"};
+                                      "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
+                                      "inertia"};
+const std::vector<std::string> kModel{"model",    "base",       "name",     "parent", "position",
+                                      "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
+const std::vector<std::string> kInertia{"density"};
+const std::vector<std::string> kStarts{"checked", "as given"};
 constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 
 /// A model of the list `models`.
@@ -46,16 +51,22 @@ class SceneReader {
     root_.entries_of(kScene, effect_keys(), "effects");
     read_model();
     read_options();
-    const auto initial = root_.find("initial");
-    scene_.initial = read_start(initial, scene_.model, bases_, given_);
+    const auto initial = root_.find("initial"), effects = root_.find("effects");
+    if (const auto rule = root_.find("start")) scene_.start_as_given = rule->choice(kStarts) == "as given";
+    Effects limited;
+    if (effects) limited.limits = read_limits(*effects, scene_.model);
+    scene_.initial = read_start(initial, scene_.model, bases_, given_, limited.limits);
     require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
     require_finite(initial.value_or(root_), "velocity", scene_.initial.velocities, scene_.model.names.velocity);
+    if (!scene_.start_as_given && !limited.limits.empty()) move_onto_limits(limited, initial ? initial->place() : file_);
     scene_.options.gravity = {};
-    if (const auto effects = root_.find("effects")) {
+    scene_.gravity_named = effects && effects->find("gravity");
+    if (effects) {
       SceneEffects read = read_effects(*effects, scene_.model, scene_.initial.positions, folder_);
       scene_.effects = std::move(read.effects);
       scene_.options.gravity = read.gravity;
       if (initial) refuse_given(*initial);
+      begin_motions();
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
       if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
@@ -63,7 +74,18 @@ class SceneReader {
   }
 
  private:
-  /// A joint whose motion is given starts where that does.
+  /// Joints whose motion is given start where that does, as fast as it does.
+  void begin_motions() {
+    const Tree& tree = scene_.model.tree;
+    for (const JointMotion& motion : scene_.effects.motions) {
+      const SmoothCurve curve(motion.position);
+      for (Index i = 1; i < tree.shape.slots; ++i) {
+        if (tree.first_v(i) != motion.row) continue;
+        scene_.initial.positions[static_cast<std::size_t>(tree.first_q(i))] = curve.at(0);
+        scene_.initial.velocities[static_cast<std::size_t>(motion.row)] = curve.slope(0);
+      }
+    }
+  }
   void refuse_given(const SceneValue& initial) const {
     for (const char* key : {"positions", "velocities"}) {
       const auto values = initial.find(key);
@@ -77,6 +99,14 @@ class SceneReader {
     }
   }
 
+  /// What rounding puts outside limits is moved, and told. What cannot be a start is refused by those who begin there.
+  void move_onto_limits(const Effects& limited, const std::string& place) {
+    StartFindings found = StartCheck(scene_.model, scene_.options, limited).look(scene_.initial.positions);
+    if (found.moved.empty()) return;
+    scene_.initial.positions = std::move(found.positions);
+    for (const std::string& moved : found.moved) scene_.model.warnings.push_back(fmt::format("{}: {}", place, moved));
+  }
+
   void warn_of_stiff_ground(const SceneValue& at) {
     const std::optional<StiffContact> stiff = stiffest_unresolved(scene_.model, scene_.options, scene_.effects);
     if (!stiff) return;
@@ -88,15 +118,16 @@ class SceneReader {
   }
 
   void read_model() {
-    const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base");
+    const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base"), inertia = root_.find("inertia");
     if (one && several) several->fail("model and models are both given", "one of them", "move the model into the list models");
     if (!one && !several)
       root_.fail("the scene has no model", "model: and a URDF file, or a generated one such as chain:3", "add it");
     if (one) {
-      scene_.model = load(*one, base);
+      scene_.model = load(*one, base, inertia);
       return;
     }
     if (base) base->fail("base stands beside models", "base beside each model of the list", "move it there");
+    if (inertia) inertia->fail("inertia stands beside models", "inertia beside each model of the list", "move it there");
     read_models(*several);
   }
 
@@ -110,12 +141,25 @@ class SceneReader {
     }
   }
 
-  Model load(const SceneValue& at, const std::optional<SceneValue>& base) const {
+  /// Of links without inertia [kg/m^3]; the command line goes over the scene.
+  std::optional<double> density_of(const std::optional<SceneValue>& inertia) const {
+    std::optional<double> density;
+    if (inertia) {
+      inertia->entries_of(kInertia);
+      const auto value = inertia->find("density");
+      if (!value) inertia->refuse("{density: number} in kg/m^3, such as 1000", "write one, or leave it out");
+      density = value->positive();
+    }
+    return given_.density ? given_.density : density;
+  }
+
+  Model load(const SceneValue& at, const std::optional<SceneValue>& base, const std::optional<SceneValue>& inertia) const {
     const std::string& name = at.text(kAModel);
     const std::optional<Base> root =
         base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
     if (is_generated(name)) {
       if (base) base->fail(fmt::format("base, but {} is generated, base and all", name), "it beside a URDF file", "leave it out");
+      if (inertia) inertia->fail(fmt::format("inertia, but {} is generated, mass and all", name), "it beside a URDF file", "leave it out");
       return at.located([&] {
         check_memory(name);
         return generate(name);
@@ -128,7 +172,7 @@ class SceneReader {
       at.fail(fmt::format("{}: there is no file {}", at.path(), linden::quoted(file)), "a URDF file, found relative to the scene",
               "check the path; a generated model is written chain:3");
     }
-    return load_urdf(file, root.value_or(Base::fixed));
+    return load_urdf(file, root.value_or(Base::fixed), Reading::lenient, density_of(inertia));
   }
 
   void read_models(const SceneValue& at) {
@@ -141,9 +185,10 @@ class SceneReader {
       if (!model)
         item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3",
                   "add it");
-      entrants.push_back({item, {load(*model, item.find("base")), "", Pose::Identity()}, read_base(item)});
+      entrants.push_back({item, {load(*model, item.find("base"), item.find("inertia")), "", Pose::Identity()}, read_base(item)});
       const auto name = item.find("name");
       if (name) entrants.back().placed.name = name->text("a name");
+      if (const auto parent = item.find("parent")) entrants.back().placed.parent = parent->text("a link of another model, such as crane/hook");
     }
     if (entrants.empty()) at.refuse("a list of models", "add one");
     give_names(entrants);

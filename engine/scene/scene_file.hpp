@@ -12,10 +12,13 @@
 //   model | models   one of them. models: a list of {model, base, name, position, rotation or quaternion, velocity,
 //                    angular_velocity}; several are one system, links and joints of each called name/link and name/joint, where
 //                    the name is the model's own unless it is given
+//   inertia          {density: kg/m^3}, beside model or beside each of models: mass of links that have shapes and no <inertial>
 //   base             fixed (default) or floating, for a URDF file
 //   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; where no
 //                    tolerance is given it goes with the order
 //   initial          engine/scene/scene_start.hpp
+//   start            checked (default): a start outside limits, against ties or in the ground is refused where it begins to move
+//                    (engine/start_check.hpp); as given: it begins there all the same
 //   effects          engine/scene/scene_effects.hpp; gravity is one of them: without its key there is none
 //
 // A floating model starts at its position and rotation, a fixed one sits there.

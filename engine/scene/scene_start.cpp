@@ -173,7 +173,7 @@ std::vector<Index> floating_roots(const Model& model) {
 }
 
 InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
-                        const SceneStart& given) {
+                        const SceneStart& given, std::span<const JointLimit> limits) {
   constexpr double kMostSeed = 9007199254740992.0;  // whole numbers beyond it have no double of their own
   std::optional<std::uint64_t> seed = given.seed;
   std::optional<double> spread = given.spread;
@@ -188,7 +188,7 @@ InitialState read_start(const std::optional<SceneValue>& at, const Model& model,
     if (const auto value = at->find("spread")) spread = spread.value_or(value->not_negative());
   }
   InitialState state{model.neutral(), std::vector<double>(static_cast<std::size_t>(model.tree.shape.velocities), 0.0)};
-  if (seed || spread) state = random_state(model, seed.value_or(kDefaultSeed), spread.value_or(kDefaultSpread));
+  if (seed || spread) state = random_state(model, seed.value_or(kDefaultSeed), spread.value_or(kDefaultSpread), limits);
   Start start(model, std::move(state));
   for (const PlacedBase& base : bases) start.place(base);
   if (!any) return start.finish();

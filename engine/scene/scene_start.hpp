@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "engine/initial_state.hpp"
 #include "engine/scene/scene_yaml.hpp"
@@ -21,6 +22,7 @@ namespace linden {
 struct SceneStart {
   std::optional<std::uint64_t> seed;
   std::optional<double> spread;
+  std::optional<double> density{};  // of links without inertia [kg/m^3], of all models that are URDF files
 };
 
 /// Pose and velocity of a base in the world, as far as they are given.
@@ -44,8 +46,8 @@ struct PlacedBase {
 /// Slots of the free joints that hang on the world.
 std::vector<Index> floating_roots(const Model& model);
 
-/// `at`: the scene's `initial`, where it has one. Throws InputError with file and line.
+/// `at`: the scene's `initial`, where it has one; `limits`: in effect, which random positions keep. Throws InputError with file and line.
 InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
-                        const SceneStart& given);
+                        const SceneStart& given, std::span<const JointLimit> limits = {});
 
 }  // namespace linden

@@ -1,4 +1,4 @@
-// URDF text becomes a sound model with either base, or is refused.
+// URDF text becomes a sound model with either base, with a density or without, or is refused.
 #include "layout/urdf.hpp"
 #include "tests/fuzz/sound_model.hpp"
 
@@ -8,5 +8,6 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
   read_or_refuse([&] {
     for (const Base base : {Base::fixed, Base::floating}) require_sound(parse_urdf(xml, "robot.urdf", base));
   });
+  read_or_refuse([&] { require_sound(parse_urdf(xml, "robot.urdf", Base::floating, Reading::lenient, 1000)); });
   return 0;
 }

@@ -101,6 +101,19 @@ void check_is_in(const PlacedModel& part, const Model& whole) {
   }
 }
 
+LinkSpec link_of(const std::string& name, const std::string& parent, JointType type, double mass, const Eigen::Vector3d& at) {
+  LinkSpec link;
+  link.name = name;
+  link.joint = name + "_joint";
+  link.parent = parent;
+  link.type = type;
+  link.axis = Eigen::Vector3d(0.6, 0, 0.8);
+  link.placement.translation() = at;
+  link.inertia = box_inertia(mass, Eigen::Vector3d(0.1, 0.2, 0.3), Eigen::Vector3d(0.02, 0.01, -0.05));
+  link.shapes = {box_shape(Eigen::Vector3d(0.1, 0.2, 0.3), Eigen::Vector3d(0.02, 0.01, -0.05))};
+  return link;
+}
+
 }  // namespace
 
 TEST_CASE("merged models keep their bodies, names, attributes and mimic joints", "[merged models]") {
@@ -183,4 +196,82 @@ TEST_CASE("models whose names meet are not merged", "[merged models]") {
   Pose broken = Pose::Identity();
   broken.translation().x() = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH(merged({{chain(2), "a", broken}}, "one"), Contains("not finite"));
+}
+
+TEST_CASE("a model that hangs from a link of another is as if it had been built there, base and all", "[merged models]") {
+  TreeBuilder crane("crane"), rope("rope"), whole("whole");
+  crane.add(link_of("mast", "", JointType::fixed, 50, {0, 0, 1}));
+  crane.add(link_of("boom", "mast", JointType::revolute, 9, {0.1, 0, 2}));
+  crane.add(link_of("hook", "boom", JointType::fixed, 1, {3, 0, 0.2}));  // part of the boom's body
+  rope.add(link_of("clamp", "", JointType::fixed, 2, {0, 0, 0.1}));
+  rope.add(link_of("first", "clamp", JointType::ball, 0.3, {0, 0, -0.1}));
+  rope.add(link_of("second", "first", JointType::revolute, 0.2, {0, 0, -0.3}));
+  Pose pose = placed(0.2, -0.1, 0.7);
+  for (LinkSpec link : {link_of("crane/mast", "", JointType::fixed, 50, {0, 0, 1}), link_of("crane/boom", "crane/mast", JointType::revolute, 9, {0.1, 0, 2}),
+                        link_of("crane/hook", "crane/boom", JointType::fixed, 1, {3, 0, 0.2})}) {
+    whole.add(link);
+  }
+  LinkSpec clamp = link_of("rope/clamp", "crane/hook", JointType::fixed, 2, {0, 0, 0.1});
+  clamp.placement = pose * clamp.placement;
+  whole.add(clamp);
+  whole.add(link_of("rope/first", "rope/clamp", JointType::ball, 0.3, {0, 0, -0.1}));
+  whole.add(link_of("rope/second", "rope/first", JointType::revolute, 0.2, {0, 0, -0.3}));
+  const Model expected = whole.build();
+  // in either order of the list
+  for (const bool rope_first : {false, true}) {
+    std::vector<PlacedModel> parts{{crane.build(), "crane", Pose::Identity()}, {rope.build(), "rope", pose, "crane/hook"}};
+    if (rope_first) std::swap(parts[0], parts[1]);
+    const Model found = merged(parts, "whole");
+    REQUIRE(found.tree.shape.slots == expected.tree.shape.slots);
+    for (Index i = 1; i < expected.tree.shape.slots; ++i) {
+      INFO(expected.names.body[static_cast<std::size_t>(i)]);
+      CHECK(found.names.body[static_cast<std::size_t>(i)] == expected.names.body[static_cast<std::size_t>(i)]);
+      CHECK(found.tree.parent(i) == expected.tree.parent(i));
+      CHECK(found.constants.subtree_mass(i) == Approx(expected.constants.subtree_mass(i)));
+      for (int k = 0; k < 10; ++k) CHECK(found.constants.inertia(i, k) == Approx(expected.constants.inertia(i, k)).margin(1e-13));
+      CHECK(placement(found, i).matrix().isApprox(placement(expected, i).matrix(), 1e-14));
+    }
+    CHECK(found.welded.mass() == 50);
+    for (const auto& [link, place] : expected.names.link) {
+      INFO(link);
+      REQUIRE(found.names.link.contains(link));
+      CHECK(found.names.link.at(link).slot == place.slot);
+      CHECK(found.names.link.at(link).in_body.matrix().isApprox(place.in_body.matrix(), 1e-14));
+    }
+    REQUIRE(found.shapes.size() == expected.shapes.size());
+    for (const BodyShape& shape : expected.shapes) {
+      const auto same = std::ranges::find(found.shapes, shape.link, &BodyShape::link);
+      REQUIRE(same != found.shapes.end());
+      CHECK(same->slot == shape.slot);
+      CHECK(same->pose.matrix().isApprox(shape.pose.matrix(), 1e-14));
+    }
+  }
+}
+
+TEST_CASE("models hang from one another in a row, from what is fixed to the world too, and neither in a ring nor from nothing", "[merged models]") {
+  const auto part = [](const std::string& name, const std::string& parent) {
+    return PlacedModel{generate("chain:2"), name, placed(0.1, 0.2, 0.3), parent};
+  };
+  const Model row = merged({part("c", "b/link2"), part("a", ""), part("b", "a/link1")}, "row");
+  CHECK(row.tree.roots().size() == 1);
+  CHECK(row.tree.levels() - 1 == 5);  // a: 2, b below its first, c below that one's second
+  TreeBuilder post("post");
+  post.add(link_of("top", "", JointType::fixed, 5, {1, 2, 3})).add(link_of("arm", "top", JointType::revolute, 1, {0, 0, 0}));
+  const Model stands = merged({{post.build(), "post", placed(0, 0, 0)}, {generate("chain:2"), "rope", Pose::Identity(), "post/top"}}, "stands");
+  const auto rope = static_cast<Index>(std::ranges::find(stands.names.body, "rope/link1") - stands.names.body.begin());
+  CHECK(stands.tree.parent(rope) == 0);
+  CHECK(placement(stands, rope).translation().isApprox(Eigen::Vector3d(1, 2, 3.3)));
+  const auto message = [](const std::vector<PlacedModel>& parts) {
+    try {
+      merged(parts, "m");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  CHECK_THAT(message({part("a", "b/link1"), part("b", "a/link1")}), Contains("model \"a\" hangs from \"b/link1\": it hangs from itself"));
+  CHECK_THAT(message({part("a", "a/link1")}), Contains("it hangs from itself"));
+  CHECK_THAT(message({part("a", ""), part("b", "a/lnk1")}), Contains("there is no link \"a/lnk1\"") && Contains("did you mean \"a/link1\"?"));
+  PlacedModel floating{load_urdf(kHumanoid, Base::floating), "h", Pose::Identity(), "a/link1"};
+  CHECK_THAT(message({part("a", ""), floating}), Contains("its base floats"));
 }

@@ -1,0 +1,77 @@
+#include "engine/program/start_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "engine/start_check.hpp"
+#include "engine/text.hpp"
+#include "layout/input_error.hpp"
+
+namespace linden {
+namespace {
+
+void note(const std::string& text) { fmt::print(stderr, "linden: note: {}\n", printable(text)); }
+
+/// A load that gravity is missing beside: "a ground", "servos", "springs"; empty where there is none.
+std::string load_of(const Effects& effects) {
+  if (effects.ground) return "a ground";
+  if (!effects.servos.empty()) return "servos";
+  return effects.springs.empty() && effects.ball_springs.empty() ? "" : "springs";
+}
+
+void look_at_scene(const MotionArguments& arguments, const Options& options) {
+  const Scene& scene = *arguments.scene;
+  const StartFindings found = StartCheck(scene.model, options, scene.effects).look(scene.initial.positions);
+  if (!found.sound()) {
+    const std::string text = fmt::format("{}: {}", arguments.model, found.text());
+    if (!scene.start_as_given && !arguments.start_as_given) throw InputError(text);
+    fmt::print(stderr, "linden: warning: {}: it starts outside of what holds it, as given: {}\n", printable(arguments.model),
+               printable(fmt::format("{}", fmt::join(found.faults, "; "))));
+  }
+  for (const std::string& told : found.told) fmt::print(stderr, "linden: warning: {}: {}\n", printable(arguments.model), printable(told));
+  const std::string load = load_of(scene.effects);
+  const bool weightless = options.gravity == std::array<double, 3>{0, 0, 0};
+  if (weightless && !scene.gravity_named && !arguments.gravity_given && !load.empty()) {
+    note(fmt::format("{} has {} and no gravity: name it under effects if it is wanted (gravity: [0, 0, -9.81])", arguments.model, load));
+  }
+}
+
+void look_at_zero(const MotionArguments& arguments, const Model& model) {
+  constexpr std::size_t kShown = 3;
+  std::vector<std::string> joints = zeros_outside_limits(model);
+  if (joints.empty()) return;
+  const std::size_t all = joints.size();
+  joints.resize(std::min(all, kShown));
+  note(fmt::format("{}: the zero of {} lies outside the limits of the file: {}{}; no limits are in effect here, a scene can name them",
+                   arguments.model, counted(static_cast<std::int64_t>(all), "joint"), fmt::join(joints, ", "),
+                   all > kShown ? fmt::format(" and {} more", all - kShown) : ""));
+}
+
+}  // namespace
+
+void look_at_start(const MotionArguments& arguments, const Model& model, const Options& options) {
+  if (arguments.scene) return look_at_scene(arguments, options);
+  if (!randomness(arguments)) look_at_zero(arguments, model);  // random positions keep the file's limits
+}
+
+void look_at_instances(const MotionArguments& arguments, const Options& options, std::int64_t instances,
+                       const std::function<std::vector<double>(std::int64_t i)>& positions) {
+  if (!arguments.scene || !arguments.scene->effects.ground || arguments.scene->start_as_given || arguments.start_as_given) return;
+  const StartCheck check(arguments.scene->model, options, arguments.scene->effects);
+  std::int64_t count = 0;
+  std::string first;
+  for (std::int64_t i = 0; i < instances; ++i) {
+    const StartFindings found = check.look_under(positions(i));
+    if (found.sound()) continue;
+    if (count == 0) first = fmt::format("instance {}: {}", i, found.faults.front());
+    count += 1;
+  }
+  if (count == 0) return;
+  fmt::print(stderr, "linden: warning: {} of {} instances start in the ground, by their random joints ({}); raise the base or choose a "
+             "smaller --spread\n", grouped(count), grouped(instances), printable(first));
+}
+
+}  // namespace linden
