@@ -71,7 +71,7 @@ std::string effect_owners(const EffectPlan& plan, const Names& names) {
   add("friction", effects.friction, joint);
   add("limits", effects.limits, joint);
   add("servos", effects.servos, joint);
-  add("motion", effects.motions, joint);
+  add("given motions", effects.motions, joint);
   add("torques", effects.torques, joint);
   add("wrenches", effects.wrenches, body);
   add("drag", effects.drag, body);
