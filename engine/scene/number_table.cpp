@@ -25,7 +25,8 @@ NumberTable read_numbers(const std::string& file, std::size_t columns, std::size
   NumberTable table;
   int line = 0;
   bool first = true;
-  for (std::size_t begin = 0; begin < text.size();) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write it
+  for (std::size_t begin = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     const std::string_view row_text = trimmed(std::string_view(text).substr(begin, end - begin));
     begin = end + 1;

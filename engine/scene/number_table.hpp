@@ -1,6 +1,6 @@
 // engine/scene/number_table.hpp
 // Numbers from a CSV file: a line a row, commas between, all rows as wide as the first. Empty lines and lines that begin with #
-// are passed over; a first line that holds no number is a header.
+// are passed over; a first line that holds no number is a header. A byte order mark before it all is no part of it.
 #pragma once
 
 #include <cstddef>

@@ -362,6 +362,9 @@ TEST_CASE("motions are numbers, tables or files; their joints start there and ha
 TEST_CASE("torques are numbers, tables or files", "[scene]") {
   const Folder folder;
   folder.write("push.csv", "time,torque\n# comment\n0, 0\n\n1.5,2\r\n2,-1e-1\n");
+  folder.write("marked.csv", "\xEF\xBB\xBF" "0, 3\n1, 4\n");
+  folder.write("marked.yaml", "model: chain:1\neffects: {torque: {joint1: marked.csv}}\n");
+  CHECK(load_scene(folder.file("marked.yaml")).effects.torques[0].force.at(0) == 3);
   folder.write("s.yaml",
                "model: chain:3\neffects:\n  torque: {joint1: 4, joint2: push.csv, joint3: {times: [0, 1], values: [5, 6]}}\n");
   const std::vector<JointTorque> torques = load_scene(folder.file("s.yaml")).effects.torques;
