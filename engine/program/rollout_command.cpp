@@ -16,9 +16,11 @@
 #include "engine/files/report_files.hpp"
 #include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
+#include "engine/program/effects_text.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/program/rollout_report.hpp"
+#include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
@@ -55,15 +57,13 @@ class Execution {
  public:
   Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
       : arguments_(arguments),
-        batch_(std::move(model), arguments.instances, arguments.options, arguments.effects()) {
+        model_(std::move(model)),
+        batch_(model_, arguments.instances, arguments.options, arguments.effects()) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
-    const Randomness random = *randomness(arguments);
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
-      const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
-      const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread, arguments.scene->effects.limits)
-                                                 : random_state(batch_.model(), seed, random.spread);
+      const InitialState state = start_of(i);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
     });
@@ -109,6 +109,7 @@ class Execution {
     if (looked_at_ != figures_.steps) look();
     if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
     finish();
+    if (figures_.signal == 0 && figures_.lost.empty()) account_of_one(interrupt);
   }
 
   /// Complaints go to stderr; true where there were none.
@@ -132,6 +133,47 @@ class Execution {
   RolloutFigures& figures() { return figures_; }
 
  private:
+  InitialState start_of(std::int64_t i) const {
+    const Randomness random = *randomness(arguments_);
+    const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
+    if (!arguments_.scene) return random_state(*model_, seed, random.spread);
+    return random_around(*model_, arguments_.scene->initial, seed, random.spread, arguments_.scene->effects.limits);
+  }
+
+  /// Of the first instance that runs.
+  void account_of_one(const Interrupt& interrupt) {
+    constexpr std::int64_t kMostSteps = 10'000, kSamples = 2'000;
+    const Effects effects = arguments_.effects();
+    if (effect_lines(effects, *model_).empty()) return;
+    AccountOfOne one;
+    while (one.instance < arguments_.instances && batch_.record(one.instance).status != StepStatus::converged) ++one.instance;
+    if (one.instance == arguments_.instances) return;
+    Simulation alone(model_, arguments_.options, effects);
+    const InitialState start = start_of(one.instance);
+    alone.set_positions(start.positions);
+    alone.set_velocities(start.velocities);
+    const std::int64_t steps = std::min(figures_.steps, kMostSteps), stretch = (steps + kSamples - 1) / kSamples;
+    one.energy = EnergyDrift(steps / stretch + 1);
+    const auto sample = [&] {
+      one.taken = alone.effect_work().taken();
+      one.given = alone.effect_work().given();
+      one.energy.add(alone.time(), alone.energy(), one.taken, one.given);
+    };
+    sample();
+    while (one.steps < steps) {
+      if (interrupt.signal() != 0) return;
+      const StepsReport report = alone.run(std::min(stretch, steps - one.steps));
+      one.steps += report.steps;
+      sample();
+      if (!report.ok()) {
+        one.warnings.push_back(alone.describe(report.last));
+        break;
+      }
+    }
+    for (std::string& warning : energy_warnings(alone, one.energy)) one.warnings.push_back(std::move(warning));
+    figures_.account = std::move(one);
+  }
+
   void recording(const std::function<void()>& work) {
     try {
       work();
@@ -184,6 +226,7 @@ class Execution {
   }
 
   const RolloutArguments& arguments_;
+  std::shared_ptr<const Model> model_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;
@@ -208,6 +251,11 @@ int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> mode
     tell("interrupted after {} of {} steps{}", grouped(figures.steps), grouped(figures.steps_planned),
                figures.frames > 0 ? fmt::format("; {} is valid up to there", arguments.record) : "");
     return 128 + figures.signal;
+  }
+  if (figures.account) {
+    for (const std::string& warning : figures.account->warnings) {
+      tell("warning: instance {} on its own: {}", grouped(figures.account->instance), warning);
+    }
   }
   if (!figures.lost.empty()) {
     tell("{}; {}; the rollout ended after {} of {} steps", figures.lost,
