@@ -18,6 +18,7 @@
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
+#include "engine/program/randomize.hpp"
 #include "engine/program/rollout_report.hpp"
 #include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
@@ -44,6 +45,7 @@ void check_instances(const RolloutArguments& arguments, const Shape& shape) {
   const double nq = shape.positions, nv = shape.velocities;
   double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
   if (!arguments.record.empty()) numbers += nq + nv;
+  if (arguments.randomization.masses) numbers += (arguments.record.empty() ? 11.0 : 13.0) * shape.slots;
   const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
   require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
                  static_cast<double>(arguments.instances) * each);
@@ -60,12 +62,21 @@ class Execution {
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
     const Randomness random = *randomness(arguments);
+    const Effects effects = arguments.effects();
+    DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, batch_.model(), effects, arguments.instances);
+    const auto randomize = [&](std::int64_t i, std::uint64_t seed) {
+      const DrawnNumbers numbers = draw(arguments.randomization, batch_.model(), effects, seed);
+      apply(numbers, effects, batch_, i);
+      drawn.set(i, numbers);
+    };
+    if (arguments.randomization.any()) randomize(0, random.seed);  // makes room, before there are several threads
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
       const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
       const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread, arguments.scene->effects.limits)
                                                  : random_state(batch_.model(), seed, random.spread);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
+      if (arguments.randomization.any()) randomize(i, seed);
     });
     look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
       const auto rows = batch_.positions().instance(i);
@@ -83,7 +94,7 @@ class Execution {
         numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
       }
       status_.resize(static_cast<std::size_t>(arguments.instances));
-      file_.emplace(arguments.record, arguments.instances, std::move(arrays));
+      file_.emplace(arguments.record, arguments.instances, std::move(arrays), drawn.arrays());
     }
     energy_.resize(static_cast<std::size_t>(arguments.instances));
   }
