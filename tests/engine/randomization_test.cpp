@@ -325,6 +325,39 @@ TEST_CASE("what was drawn acts where an instance is stepped alone, too", "[rando
   }
 }
 
+TEST_CASE("the ground has its drawn friction where an instance is stepped alone, too", "[randomization]") {
+  // two balanced wheels in a box that turn as one leave its motion as it is
+  TreeBuilder builder("box with wheels");
+  LinkSpec trunk;
+  trunk.name = "box";
+  trunk.joint = "base";
+  trunk.type = JointType::free;
+  trunk.inertia = {0.8, Vector3d::Zero(), 0.01 * Eigen::Matrix3d::Identity()};
+  builder.add(trunk);
+  for (const char* const name : {"left", "right"}) {
+    LinkSpec wheel;
+    wheel.name = name;
+    wheel.joint = std::string("to ") + name;
+    wheel.parent = "box";
+    wheel.inertia = {0.1, Vector3d::Zero(), 1e-4 * Eigen::Matrix3d::Identity()};
+    if (wheel.name == "right") wheel.mimic = "to left";
+    builder.add(wheel);
+  }
+  const Box box;
+  const double slope = std::atan(0.7);
+  const Randomization randomization{.masses = {}, .friction = Range{0.2, 0.6}, .joint_friction = {}, .gains = {}};
+  Batch batch(builder.build(), 6, options_of(1e-3, {kG * std::sin(slope), 0, -kG * std::cos(slope)}), box.effects);
+  draw_all(batch, randomization, box.effects);
+  const std::vector<double> start = box.lying(slope);
+  batch.reset_all([&](std::int64_t, std::span<double> q, std::span<double>) { std::ranges::copy(start, q.begin()); });
+  batch.step(500);
+  CHECK(batch.summary().rescued == 500 * batch.size());
+  for (std::int64_t i = 0; i < batch.size(); ++i) {
+    const double friction = *draw(randomization, batch.model(), box.effects, static_cast<std::uint64_t>(i) + 1).ground_friction;
+    CHECK(batch.positions()(i, 0) == Approx(0.125 * kG * (std::sin(slope) - friction * std::cos(slope))).margin(1e-3));
+  }
+}
+
 TEST_CASE("what is drawn gives the same bits in any company, on any threads, in any splitting, after a reset", "[randomization]") {
   // with an arm that bounces at its limits: those steps are taken alone
   TreeBuilder builder("box with an arm");
