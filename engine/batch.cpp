@@ -92,7 +92,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, applied, mass, targets, frictions, excess_before, reading, bend, kept;
+  Numbers<Real> q, p, applied, mass, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -130,9 +130,10 @@ struct BatchOf<Real>::Data {
     });
   }
 
-  template <class Entry>
-  static Index count_of(const std::vector<Entry>& entries) {
-    return static_cast<Index>(entries.size());
+  static Index count_of(const auto& entries) { return static_cast<Index>(entries.size()); }
+  /// The ground as a list: of one, or none.
+  std::span<const Ground> grounds() const {
+    return plan.effects.ground ? std::span<const Ground>(&*plan.effects.ground, 1) : std::span<const Ground>();
   }
   const Shape& shape() const { return model->tree.shape; }
   std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
@@ -146,6 +147,8 @@ struct BatchOf<Real>::Data {
             mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
             targets.empty() ? nullptr : targets.data() + at(b, count_of(plan.effects.servos)),
             frictions.empty() ? nullptr : frictions.data() + at(b, count_of(plan.effects.friction)),
+            gains.empty() ? nullptr : gains.data() + at(b, count_of(plan.effects.servos)),
+            ground_friction.empty() ? nullptr : ground_friction.data() + at(b, 1),
             excess_before.empty() ? nullptr : excess_before.data() + at(b, nv),
             reading.empty() ? nullptr : reading.data() + at(b, nv),
             bend.empty() ? nullptr : bend.data() + at(b, nv),
@@ -172,13 +175,13 @@ struct BatchOf<Real>::Data {
   }
 
   /// A number an entry of an effect and instance, at first own(entry).
-  template <class Entry, class Own>
-  BatchView<Real> numbers_of(Numbers<Real>& numbers, const std::vector<Entry>& entries, const Own& own) {
+  template <class Entries, class Own>
+  BatchView<Real> numbers_of(Numbers<Real>& numbers, const Entries& entries, const Own& own) {
     if (numbers.empty()) {
       numbers.resize(at(blocks, count_of(entries)));
       for_blocks([&](std::int64_t b, Worker&) {
         Real* to = numbers.data() + at(b, count_of(entries));
-        for (const Entry& entry : entries) {
+        for (const auto& entry : entries) {
           for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(own(entry));
         }
       });
@@ -317,6 +320,16 @@ BatchView<Real> BatchOf<Real>::servo_targets() {
 }
 
 template <class Real>
+BatchView<Real> BatchOf<Real>::gains() {
+  return data_->numbers_of(data_->gains, data_->plan.effects.servos, [](const Servo&) { return 1.0; });
+}
+
+template <class Real>
+BatchView<Real> BatchOf<Real>::ground_friction() {
+  return data_->numbers_of(data_->ground_friction, data_->grounds(), [](const Ground& ground) { return ground.friction; });
+}
+
+template <class Real>
 BatchView<Real> BatchOf<Real>::friction() {
   return data_->numbers_of(data_->frictions, data_->plan.effects.friction, [](const JointFriction& entry) { return entry.force; });
 }
@@ -331,10 +344,11 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
   const Eigen::Vector3d mc(inertia[1], inertia[2], inertia[3]);
   Eigen::Matrix3d I;
   I << inertia[4], inertia[5], inertia[6], inertia[5], inertia[7], inertia[8], inertia[6], inertia[8], inertia[9];
+  const double scale = I.norm();  // of a mass far from the origin, of which nothing but rounding may be left below
   const bool finite = std::ranges::all_of(inertia, [](double value) { return std::isfinite(value); });
   if (finite && m > 0) I -= (mc.squaredNorm() * Eigen::Matrix3d::Identity() - mc * mc.transpose()) / m;
   if (!finite || m < 0 || (m == 0 && !(mc.isZero(0))) ||
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I).eigenvalues()[0] < -1e-9 * (I.norm() + 1e-300)) {
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I).eigenvalues()[0] < -1e-9 * (scale + 1e-300)) {
     throw InputError(fmt::format("instance {}, body \"{}\": mass {} and its moments are no body's: expected finite numbers, a mass that is "
                                  "not negative and an inertia about the centre of mass that is positive definite",
                                  i, model().names.body[static_cast<std::size_t>(slot)], m));
@@ -428,8 +442,8 @@ std::string BatchOf<Real>::describe(std::int64_t i) const {
 template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
   std::size_t numbers = 0;
-  for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->frictions,
-                                    &data_->excess_before, &data_->reading, &data_->bend, &data_->kept}) {
+  for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->gains, &data_->frictions,
+                                    &data_->ground_friction, &data_->excess_before, &data_->reading, &data_->bend, &data_->kept}) {
     numbers += some->size();
   }
   return numbers * sizeof(Real) +

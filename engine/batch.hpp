@@ -14,8 +14,8 @@
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
 //
-// Effects act as in a Simulation, on lanes and threads alike; forces, servo targets and joint friction may differ from instance to
-// instance.
+// Effects act as in a Simulation, on lanes and threads alike; masses, forces, servo targets and gains, friction of joints and of the ground
+// may differ from instance to instance.
 //
 // Models with mimic joints are stepped an instance at a time, on all threads but without lanes.
 #pragma once
@@ -118,12 +118,18 @@ class BatchOf {
   /// Of a servo whose target is a table the row holds NaN until a number is written, which then goes over the table; NaN gives the servo
   /// back to it.
   BatchView<Real> servo_targets();
+  /// Factors of the servos' stiffness and damping, in the order of Effects::servos, likewise, at first 1; none may be negative. What a servo
+  /// feeds forward and its limit of force stay.
+  BatchView<Real> gains();
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none may be negative.
   BatchView<Real> friction();
+  /// Coulomb's coefficient of the ground, likewise: one row, none without ground; it may not be negative.
+  BatchView<Real> ground_friction();
 
   /// Mass m [kg], first moment m c [kg m] and inertia xx xy xz yy yz zz [kg m^2] about the body frame's origin, of one body of one
-  /// instance; the first call gives every instance masses of its own. Keeps positions and momenta, so set it before reset. Throws
-  /// InputError for an inertia that is not positive definite.
+  /// instance; the first call gives every instance masses of its own, after it several threads may set those of different instances at once.
+  /// Keeps positions and momenta, so set it before reset. Effects that a step does not resolve are taken as implicitly as the model's masses
+  /// call for. Throws InputError for an inertia that is not positive definite.
   void set_inertia(std::int64_t i, Index slot, const std::array<double, 10>& inertia);
   std::array<double, 10> inertia(std::int64_t i, Index slot) const;
 

@@ -47,9 +47,12 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
   if (!plan_->curves.empty()) set_positions(model_->neutral());
 }
 
-Simulation::Simulation(const Scene& scene) : Simulation(scene.model, scene.options, scene.effects) {
-  if (const std::vector<double> positions = checked_start(scene); !positions.empty()) set_positions(positions);
-  if (!scene.initial.velocities.empty()) set_velocities(scene.initial.velocities);
+Simulation::Simulation(const Scene& scene)
+    : Simulation(scene.randomization.any() ? std::make_shared<const Scene>(drawn(scene)) : std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene)) {}
+
+Simulation::Simulation(const std::shared_ptr<const Scene>& instance) : Simulation(instance->model, instance->options, instance->effects) {
+  if (const std::vector<double> positions = checked_start(*instance); !positions.empty()) set_positions(positions);
+  if (!instance->initial.velocities.empty()) set_velocities(instance->initial.velocities);
 }
 
 void Simulation::check_row_count(const char* what, std::size_t found, Index expected) const {
@@ -117,15 +120,34 @@ void Simulation::set_servo_targets(std::span<const double> targets) {
   std::ranges::copy(targets, to.begin());
 }
 
+namespace {
+
+void require_not_negative(const std::string& what, double number) {
+  if (std::isfinite(number) && number >= 0) return;
+  throw InputError(fmt::format("the {} is {}; expected a finite number, zero or more", what, number));
+}
+
+}  // namespace
+
+void Simulation::set_gains(std::span<const double> factors) {
+  check_row_count("factors of gains", factors.size(), static_cast<Index>(plan_->effects.servos.size()));
+  for (std::size_t k = 0; k < factors.size(); ++k) require_not_negative(fmt::format("factor of the gains of servo {}", k), factors[k]);
+  for (std::size_t k = 0; k < factors.size(); ++k) stepper_->set_gain(static_cast<Index>(k), factors[k]);
+}
+
 void Simulation::set_friction(std::span<const double> forces) {
   const std::span<double> to = stepper_->friction_forces();
   check_row_count("forces of friction", forces.size(), static_cast<Index>(to.size()));
-  for (std::size_t k = 0; k < forces.size(); ++k) {
-    if (!std::isfinite(forces[k]) || forces[k] < 0) {
-      throw InputError(fmt::format("the force of friction {} is {}; expected a finite number, zero or more", k, forces[k]));
-    }
-  }
+  for (std::size_t k = 0; k < forces.size(); ++k) require_not_negative(fmt::format("force of friction {}", k), forces[k]);
   std::ranges::copy(forces, to.begin());
+}
+
+void Simulation::set_ground_friction(double coefficient) {
+  if (!plan_->effects.ground) {
+    throw InputError("the friction of the ground was set and there is no ground; expected one among the effects; name it there");
+  }
+  require_not_negative("friction of the ground", coefficient);
+  stepper_->set_ground_friction(coefficient);
 }
 
 std::vector<double> Simulation::motion_forces() const {

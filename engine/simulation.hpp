@@ -48,7 +48,7 @@ class Simulation {
   /// At rest in the model's zero configuration, but for joints whose motion is given. Throws InputError for options and effects that make no sense, and for a null pointer.
   explicit Simulation(Model model, const Options& options = {}, const Effects& effects = {});
   explicit Simulation(std::shared_ptr<const Model> model, const Options& options = {}, const Effects& effects = {});
-  /// At the start of the scene (engine/scene/scene.hpp). Throws InputError too where that lies outside limits, contradicts ties or is in the
+  /// At the start of the scene (engine/scene/scene.hpp), with what its seed draws of what is randomised. Throws InputError too where that lies outside limits, contradicts ties or is in the
   /// ground, unless the scene takes it as given (engine/start_check.hpp). Positions that are set later are not looked at.
   explicit Simulation(const Scene& scene);
 
@@ -77,8 +77,12 @@ class Simulation {
   /// have a table the number goes over it from now on, and NaN gives the servo back to its table; target velocity and feed-forward go on
   /// as the effects say. Throws InputError for a wrong count or another number that is not finite.
   void set_servo_targets(std::span<const double> targets);
+  /// Factors of the servos' stiffness and damping as the effects have them, in the order of Effects::servos, likewise; none negative.
+  void set_gains(std::span<const double> factors);
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none negative.
   void set_friction(std::span<const double> forces);
+  /// Coulomb's coefficient of the ground, likewise. Throws InputError too where there is no ground.
+  void set_ground_friction(double coefficient);
 
   /// Forces [N m, N] of the motions that the effects give, in the order of Effects::motions: those that made the last step, at its beginning.
   std::vector<double> motion_forces() const;
@@ -120,6 +124,8 @@ class Simulation {
   void load(const std::string& file);
 
  private:
+  /// Of the instance that is meant, where something is randomised.
+  explicit Simulation(const std::shared_ptr<const Scene>& instance);
   std::vector<double> mean_forces(const std::vector<double>& impulses) const;
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();

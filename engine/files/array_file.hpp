@@ -1,5 +1,5 @@
 // engine/files/array_file.hpp
-// Files of named arrays: arrays of numbers, which grow along their first axis a row at a time, and lists of words. They appear when they
+// Files of named arrays: arrays of numbers, which grow along their first axis a row at a time or stay as they are, and lists of words. They appear when they
 // are committed, whole or not at all; memory does not grow with the rows. Equal content makes equal bytes: no time of day is in it.
 #pragma once
 
@@ -25,6 +25,8 @@ class ArrayFile {
 
   /// An array [rows, row...] that has no rows yet. columns: what its numbers are called in a table; empty: they are in none.
   virtual void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string> columns) = 0;
+  /// An array of so many doubles as the shape says, which is whole from the beginning; it is in no table.
+  virtual void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) = 0;
   /// An array [words]. Words are UTF-8.
   virtual void add_words(const std::string& name, std::span<const std::string> words) = 0;
   /// A row of every array of numbers, in the order in which they were added. Where the disk has no room for all of them, and for what

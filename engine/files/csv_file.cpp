@@ -46,6 +46,8 @@ class CsvFile final : public ArrayFile {
     if (columns.size() == count) columns_.insert(columns_.end(), columns.begin(), columns.end());
   }
 
+  void add_fixed(const std::string&, std::vector<std::int64_t>, std::span<const double>) override {}
+
   void add_words(const std::string&, std::span<const std::string>) override {}
 
   void append(std::span<const void* const> rows) override {

@@ -92,6 +92,14 @@ class H5File final : public ArrayFile {
                        own(H5Sclose, H5Screate_simple, static_cast<int>(now.size()) - 1, now.data() + 1, nullptr), native, now, chunk[0], room});
   }
 
+  void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) override {
+    const std::vector<hsize_t> sizes(shape.begin(), shape.end());
+    const Handle space = own(H5Sclose, H5Screate_simple, static_cast<int>(sizes.size()), sizes.data(), nullptr);
+    Handle dataset = create(name, H5T_IEEE_F64LE, space, without_times());
+    call(H5Dwrite, dataset.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data());
+    finish(dataset);
+  }
+
   void add_words(const std::string& name, std::span<const std::string> words) override {
     std::size_t longest = 1;
     for (const std::string& word : words) longest = std::max(longest, word.size());

@@ -75,6 +75,15 @@ class NpzFile final : public ArrayFile {
     begin(name, code, std::move(row), static_cast<std::size_t>(bytes));
   }
 
+  void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) override {
+    const std::int64_t rows = shape.front();
+    shape.erase(shape.begin());
+    const std::int64_t bytes = std::accumulate(shape.begin(), shape.end(), static_cast<std::int64_t>(sizeof(double)), std::multiplies<>());
+    Array& array = begin(name, "<f8", std::move(shape), static_cast<std::size_t>(bytes));
+    array.out.append({reinterpret_cast<const char*>(numbers.data()), numbers.size_bytes()});
+    array.rows = rows;
+  }
+
   void add_words(const std::string& name, std::span<const std::string> words) override {
     std::vector<std::u32string> decoded(words.size());
     std::ranges::transform(words, decoded.begin(), code_points);

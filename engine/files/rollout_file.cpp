@@ -58,7 +58,8 @@ struct RolloutFile<Real>::Data {
 };
 
 template <class Real>
-RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> recorded)
+RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> recorded,
+                               const std::vector<FixedArray>& fixed)
     : data_(new Data{file, instances, std::move(recorded), array_file(file, instances)}) {
   constexpr ElementType kReal = std::is_same_v<Real, float> ? ElementType::float32 : ElementType::float64;
   ArrayFile& arrays = *data_->arrays;
@@ -68,9 +69,17 @@ RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, 
     arrays.add_numbers(array.name, kReal, {instances, std::ssize(array.rows)}, prefixed(array.prefix, array.rows));
   }
   arrays.add_numbers("status", ElementType::uint8, {instances}, {});
+  for (const FixedArray& array : fixed) {
+    std::vector<std::int64_t> shape{instances};
+    if (!array.names.empty()) shape.push_back(std::ssize(array.columns));
+    arrays.add_fixed(array.name, shape, array.numbers);
+  }
   std::set<std::string> named;
   for (const RecordedArray& array : data_->recorded) {
     if (named.insert(array.names).second) arrays.add_words(array.names, array.rows);
+  }
+  for (const FixedArray& array : fixed) {
+    if (!array.names.empty() && named.insert(array.names).second) arrays.add_words(array.names, array.columns);
   }
   arrays.add_words("statuses", kStatuses);
 }

@@ -11,7 +11,15 @@
 //   positions  [nq], velocities [nv]         names of the coordinates; in h5py text is data["positions"].asstr()[:]
 //   statuses   [5]                           what the numbers of `status` mean
 //
-// In place of q and v there may be other arrays [F, N, rows], each with its names. All are float32 where the batch is, else float64. F frames
+// Beside them there may be arrays [N, columns] or [N] of numbers that do not change, each with the names of its columns: what was drawn for
+// every instance of a scene that is randomised.
+//
+//   mass_factors            [N, bodies]   bodies [bodies]
+//   ground_friction         [N]
+//   joint_friction_factors  [N, joints]   friction_joints [joints]
+//   gain_factors            [N, servos]   servos [servos]
+//
+// In place of q and v there may be other arrays [F, N, rows], each with its names. All are float32 where the batch is, else float64, which those that do not change always are. F frames
 // of N instances are written one by one as they come; the file appears when it is committed, whole or not at all.
 //
 // FILE.csv is the same of one instance as a table: the columns time, energy, and those of the arrays; without the status.
@@ -35,6 +43,14 @@ struct RecordedArray {
   std::string prefix;             // before them in a table
 };
 
+/// Numbers of every instance that stay as they are.
+struct FixedArray {
+  std::string name;
+  std::string names;                 // of the array with the names of its columns; empty: it has no such axis
+  std::vector<std::string> columns;  // these
+  std::vector<double> numbers;       // [N x columns], or [N]
+};
+
 RecordedArray recorded_positions(const Names& names);
 RecordedArray recorded_velocities(const Names& names);
 
@@ -43,7 +59,7 @@ class RolloutFile {
  public:
   /// FILE.npz, FILE.h5 or, of one instance, FILE.csv. Throws std::runtime_error, as add and commit do: `FILE: cannot be written: reason`.
   /// After that add throws again, and commit puts the frames before in place; nothing else is left in the folder.
-  RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> arrays);
+  RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed = {});
   /// With q and v.
   RolloutFile(const std::string& file, const Names& names, std::int64_t instances)
       : RolloutFile(file, instances, {recorded_positions(names), recorded_velocities(names)}) {}

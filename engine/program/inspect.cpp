@@ -224,6 +224,7 @@ class Printer {
     for (const EffectLine& line : effect_lines(scene.effects, model_)) {
       say("  {:<9} {}, {}\n", line.name, line.where, line.what);
     }
+    if (scene.randomization.any()) say("\ndrawn for each instance: {}\n", randomization_text(scene.randomization));
     const std::vector<EffectCost>& costs = costs_.effects;
     say("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs.front().nanoseconds,
                costs.back().nanoseconds);

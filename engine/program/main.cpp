@@ -21,6 +21,7 @@
 
 #include "engine/program/accuracy_command.hpp"
 #include "engine/program/inspect.hpp"
+#include "engine/program/randomize.hpp"
 #include "engine/program/rollout_command.hpp"
 #include "engine/program/run_command.hpp"
 #include "engine/program/scaling_command.hpp"
@@ -37,7 +38,7 @@ namespace {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct Texts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      what, shape, dofs, steps, budget, start, density;
+      what, shape, dofs, steps, budget, start, density, randomize;
 };
 
 std::array<double, 3> gravity_from(const std::string& text) {
@@ -130,9 +131,16 @@ void read_recording_options(const Texts& texts, Arguments& arguments) {
   if (!texts.what.empty()) arguments.what = quantities_from(texts.what);
 }
 
+void read_randomize_option(const Texts& texts, MotionArguments& motion) {
+  if (motion.scene) motion.randomization = motion.scene->randomization;
+  if (!texts.randomize.empty()) randomize_from(texts.randomize, motion.effects(), motion.randomization);
+}
+
 void read_run_options(const Texts& texts, RunArguments& run) {
   read_over_scene(run, run.options, [&] { read_motion_options(texts, run, run.options); });
-  if (!run.load.empty() && randomness(run)) {
+  read_randomize_option(texts, run);
+  // with a seed a randomised run finds its masses again
+  if (!run.load.empty() && (run.spread || (run.seed && !run.randomization.any()))) {
     throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
   }
   read_recording_options(texts, run);
@@ -144,6 +152,7 @@ void read_run_options(const Texts& texts, RunArguments& run) {
 
 void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
   read_over_scene(rollout, rollout.options, [&] { read_motion_options(texts, rollout, rollout.options); });
+  read_randomize_option(texts, rollout);
   if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
   read_recording_options(texts, rollout);
   read_order(texts, rollout.options);
@@ -219,6 +228,9 @@ struct Adding {
   void spread(const char* group, Texts& texts) const {
     (*this)(group, "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
   }
+  void randomize(const char* group, Texts& texts) const {
+    (*this)(group, "--randomize", texts.randomize, "NAME=RANGE,...", "draw masses, friction, joint_friction or gains; see below");
+  }
   void start(const char* group, Texts& texts) const {
     (*this)(group, "--start", texts.start, "RULE", "checked (default): a scene may not begin outside limits or in the ground; or as-given");
   }
@@ -237,6 +249,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
   add.spread("Start", texts);
   add.start("Start", texts);
+  add.randomize("Start", texts);
   add("Start", "--load", run.load, "FILE", "continue from a checkpoint");
   add("Method", "--solver", texts.solver, "NAME", "newton (default) or riqn");
   add("Method", "--guess", texts.guess, "NAME", "extrapolation (default), ig1, ig2 or ig3");
@@ -256,6 +269,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
       "--what takes positions, velocities, servos (the force of each), forces (of all effects on each coordinate), energies (kinetic,\n"
       "potential, taken and given by each effect) and contacts (points and normal force of each body). Unless told otherwise a table has\n"
       "positions, npz and h5 have positions and velocities, and a plot has the drift of energy. Forces are means over the step before.\n\n"
+      "--randomize goes over what a scene says; the seed says what is drawn. See linden rollout --help.\n\n"
       "Examples:\n"
       "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"
       "  linden run models/humanoid.urdf --base floating --gravity 0,0,0 --spread 0.5 --plot energy.png\n"
@@ -271,6 +285,7 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
   add.spread("Instances", texts);
+  add.randomize("Instances", texts);
   add.start("Instances", texts);
   add.base("Motion", texts);
   add.density("Motion", texts);
@@ -290,6 +305,9 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   command->footer(
       "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C, SIGTERM and SIGHUP end\n"
       "a rollout early and keep its files; on a full disk it ends with what fits.\n\n"
+      "--randomize masses=0.2,friction=0.4:1.0,gains=0.1 draws for each instance, by its seed: a factor from 0.8 to 1.2 for the mass of each\n"
+      "body, the friction of the ground from 0.4 to 1.0, a factor for the gains of each servo; joint_friction likewise. It goes over what a\n"
+      "scene says, and what was drawn is in the --record file.\n\n"
       "Examples:\n"
       "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
       "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"

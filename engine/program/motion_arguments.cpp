@@ -37,6 +37,10 @@ std::optional<Randomness> randomness(const MotionArguments& arguments) {
   return Randomness{arguments.seed.value_or(kDefaultSeed), arguments.spread.value_or(kDefaultSpread)};
 }
 
+std::uint64_t drawing_seed(const MotionArguments& arguments) {
+  return arguments.seed.value_or(arguments.scene ? arguments.scene->seed : kDefaultSeed);
+}
+
 std::string start_text(const MotionArguments& arguments) {
   if (const auto random = randomness(arguments)) {
     return fmt::format("{}random positions and speeds, seed {}, spread {:g}", arguments.scene ? "as the scene says, from " : "",

@@ -32,6 +32,7 @@ struct MotionArguments : ModelArguments {
   std::optional<double> spread;
   bool start_as_given = false;  // no start is refused
   bool gravity_given = false;   // beside the scene
+  Randomization randomization{};  // the scene's, and what the command line has over it
 };
 
 /// Seed and spread as they are used; nothing where neither was given.
@@ -40,6 +41,9 @@ struct Randomness {
   double spread;
 };
 std::optional<Randomness> randomness(const MotionArguments& arguments);
+
+/// Which draws what is randomised of one instance: the command line's, or the scene's.
+std::uint64_t drawing_seed(const MotionArguments& arguments);
 
 /// "at rest in the zero configuration", "as the scene says, from random positions and speeds, seed 1, spread 0.1"
 std::string start_text(const MotionArguments& arguments);

@@ -19,6 +19,7 @@
 #include "engine/program/effects_text.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
+#include "engine/program/randomize.hpp"
 #include "engine/program/rollout_report.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
@@ -46,6 +47,7 @@ void check_instances(const RolloutArguments& arguments, const Shape& shape) {
   const double nq = shape.positions, nv = shape.velocities;
   double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
   if (!arguments.record.empty()) numbers += nq + nv;
+  if (arguments.randomization.masses) numbers += (arguments.record.empty() ? 11.0 : 13.0) * shape.slots;
   const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
   require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
                  static_cast<double>(arguments.instances) * each);
@@ -58,14 +60,23 @@ class Execution {
   Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
       : arguments_(arguments),
         model_(std::move(model)),
-        batch_(model_, arguments.instances, arguments.options, arguments.effects()) {
+        effects_(arguments.effects()),
+        batch_(model_, arguments.instances, arguments.options, effects_) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
+    DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, *model_, effects_, arguments.instances);
+    const auto randomize = [&](std::int64_t i) {
+      const DrawnNumbers numbers = drawn_of(i);
+      apply(numbers, effects_, batch_, i);
+      drawn.set(i, numbers);
+    };
+    if (arguments.randomization.any()) randomize(0);  // makes room, before there are several threads
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
       const InitialState state = start_of(i);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
+      if (arguments.randomization.any()) randomize(i);
     });
     look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
       const auto rows = batch_.positions().instance(i);
@@ -83,7 +94,7 @@ class Execution {
         numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
       }
       status_.resize(static_cast<std::size_t>(arguments.instances));
-      file_.emplace(arguments.record, arguments.instances, std::move(arrays));
+      file_.emplace(arguments.record, arguments.instances, std::move(arrays), drawn.arrays());
     }
     energy_.resize(static_cast<std::size_t>(arguments.instances));
   }
@@ -133,22 +144,29 @@ class Execution {
   RolloutFigures& figures() { return figures_; }
 
  private:
+  std::uint64_t seed_of(std::int64_t i) const { return randomness(arguments_)->seed + static_cast<std::uint64_t>(i); }
   InitialState start_of(std::int64_t i) const {
-    const Randomness random = *randomness(arguments_);
-    const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
-    if (!arguments_.scene) return random_state(*model_, seed, random.spread);
-    return random_around(*model_, arguments_.scene->initial, seed, random.spread, arguments_.scene->effects.limits);
+    const double spread = randomness(arguments_)->spread;
+    if (!arguments_.scene) return random_state(*model_, seed_of(i), spread);
+    return random_around(*model_, arguments_.scene->initial, seed_of(i), spread, effects_.limits);
   }
+  DrawnNumbers drawn_of(std::int64_t i) const { return draw(arguments_.randomization, *model_, effects_, seed_of(i)); }
 
   /// Of the first instance that runs.
   void account_of_one(const Interrupt& interrupt) {
     constexpr std::int64_t kMostSteps = 10'000, kSamples = 2'000;
-    const Effects effects = arguments_.effects();
-    if (effect_lines(effects, *model_).empty()) return;
+    if (effect_lines(effects_, *model_).empty()) return;
     AccountOfOne one;
     while (one.instance < arguments_.instances && batch_.record(one.instance).status != StepStatus::converged) ++one.instance;
     if (one.instance == arguments_.instances) return;
-    Simulation alone(model_, arguments_.options, effects);
+    std::shared_ptr<const Model> model = model_;
+    Effects effects = effects_;
+    if (arguments_.randomization.any()) {
+      const auto own = std::make_shared<Model>(*model_);
+      apply(drawn_of(one.instance), *own, effects);
+      model = own;
+    }
+    Simulation alone(model, arguments_.options, effects);
     const InitialState start = start_of(one.instance);
     alone.set_positions(start.positions);
     alone.set_velocities(start.velocities);
@@ -227,6 +245,7 @@ class Execution {
 
   const RolloutArguments& arguments_;
   std::shared_ptr<const Model> model_;
+  const Effects effects_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;

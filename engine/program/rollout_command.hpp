@@ -1,7 +1,7 @@
 // engine/program/rollout_command.hpp
 // `linden rollout`: many instances of one model, each from a random start of its own.
 //
-//   start     instance i starts from random_state(seed + i, spread)
+//   start     instance i starts from random_state(seed + i, spread), and is randomised by the same seed (engine/randomization.hpp)
 //   steps     all instances, in stretches of some tenths of a second between which progress is shown and an interrupt heard
 //   fails     an instance whose step fails is frozen at its last good state; the others go on, and the exit code is 1
 //   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step; where the recording

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/program/effects_text.hpp"
+#include "engine/program/randomize.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -58,6 +59,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                                arguments.single ? "single precision" : "double precision"));
   row("start", fmt::format("{}random positions and speeds, seeds {} to {}, spread {:g}", arguments.scene ? "as the scene says, with " : "",
                            random->seed, random->seed + static_cast<std::uint64_t>(arguments.instances) - 1, random->spread));
+  if (arguments.randomization.any()) row("randomize", randomize_text(arguments.randomization, random->seed, arguments.instances));
   const Effects effects = arguments.effects();
   std::string label = "effects";
   for (const EffectLine& line : effect_lines(effects, model)) {
@@ -135,6 +137,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"gravity", options.gravity},
       {"seed", random->seed},
       {"spread", random->spread},
+      {"randomize", randomize_json(arguments.randomization, random->seed, arguments.instances)},
       {"steps_planned", figures.steps_planned},
       {"steps", figures.steps},
       {"env_steps", figures.summary.steps},

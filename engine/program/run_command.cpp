@@ -18,6 +18,7 @@
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
+#include "engine/program/randomize.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
@@ -56,6 +57,25 @@ Outputs checked_outputs(const RunArguments& arguments) {
   return outputs;
 }
 
+/// Makes model and scene those of the one instance that there is.
+DrawnNumbers randomize(RunArguments& arguments, std::shared_ptr<const Model>& model) {
+  const Randomization& randomization = arguments.randomization;
+  if (!randomization.any()) return {};
+  const DrawnNumbers numbers = draw(randomization, *model, arguments.effects(), drawing_seed(arguments));
+  if (arguments.scene) {
+    const auto scene = std::make_shared<Scene>(*arguments.scene);
+    apply(numbers, scene->model, scene->effects);
+    arguments.scene = scene;
+    model = {scene, &scene->model};
+  } else {
+    const auto own = std::make_shared<Model>(*model);
+    Effects none;
+    apply(numbers, *own, none);
+    model = own;
+  }
+  return numbers;
+}
+
 /// Puts the simulation where the run is to begin.
 void begin_run(const RunArguments& arguments, Simulation& simulation) {
   if (!arguments.load.empty()) return simulation.load(arguments.load);
@@ -72,7 +92,9 @@ void begin_run(const RunArguments& arguments, Simulation& simulation) {
 /// One run from its first sample to its files.
 class Execution {
  public:
-  Execution(const RunArguments& arguments, Simulation& simulation, std::int64_t steps) : arguments_(arguments), simulation_(simulation) {
+  Execution(const RunArguments& arguments, Simulation& simulation, std::int64_t steps, const DrawnNumbers& drawn)
+      : arguments_(arguments), simulation_(simulation) {
+    figures_.drawn = drawn;
     figures_.steps_planned = steps;
     figures_.sampled_every = arguments.record.empty() ? energy_stride(steps) : 1;
     figures_.begin = simulation.time();
@@ -80,7 +102,9 @@ class Execution {
     if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
     if (!arguments.record.empty()) {
       observer_.emplace(simulation, arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what);
-      file_.emplace(arguments.record, 1, observer_->arrays());
+      DrawnArrays arrays(arguments.randomization, simulation.model(), simulation.effects(), 1);
+      arrays.set(0, drawn);
+      file_.emplace(arguments.record, 1, observer_->arrays(), arrays.arrays());
     }
     if (!arguments.plot.empty() && !arguments.what.empty()) begin_traces();
   }
@@ -228,20 +252,22 @@ std::string ending(const Execution& run, const RunFigures& figures, const Option
 
 }  // namespace
 
-int run_command(const RunArguments& arguments) {
+int run_command(const RunArguments& given) {
   const Clock::time_point begin = Clock::now();
+  RunArguments arguments = given;
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   const Outputs outputs = checked_outputs(arguments);
 
-  const std::shared_ptr<const Model> model = arguments.loaded(outputs);
+  std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
+  const DrawnNumbers drawn = randomize(arguments, model);
   if (arguments.load.empty()) look_at_start(arguments, *model, arguments.options);
   Simulation simulation(model, arguments.options, arguments.effects());
   begin_run(arguments, simulation);
 
   const Interrupt interrupt;
-  Execution run(arguments, simulation, steps);
+  Execution run(arguments, simulation, steps, drawn);
   run.steps(interrupt);
   RunFigures& figures = run.figures();
   figures.total_seconds = seconds(Clock::now() - begin);

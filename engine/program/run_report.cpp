@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "engine/program/effects_text.hpp"
+#include "engine/program/randomize.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/step/composition.hpp"
 #include "engine/text.hpp"
@@ -67,6 +68,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
 
   row("model", model_text(arguments, model));
   row("start", begin_text(arguments, figures));
+  if (arguments.randomization.any()) row("randomize", randomize_text(arguments.randomization, drawing_seed(arguments), 1));
   const Effects effects = arguments.effects();
   std::string label = "effects";
   for (const EffectLine& line : effect_lines(effects, model)) {
@@ -171,6 +173,8 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"gravity", options.gravity},
       {"seed", random ? Json(random->seed) : Json(nullptr)},
       {"spread", random ? Json(random->spread) : Json(nullptr)},
+      {"randomize", randomize_json(arguments.randomization, drawing_seed(arguments), 1)},
+      {"drawn", arguments.randomization.any() ? drawn_json(figures.drawn) : Json(nullptr)},
       {"loaded", if_given(arguments.load)},
       {"time_begin", figures.begin},
       {"duration", figures.simulated(options.step)},

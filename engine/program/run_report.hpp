@@ -25,6 +25,7 @@ struct QuantityTrace {
 
 /// Counted while a run goes on.
 struct RunFigures {
+  DrawnNumbers drawn;  // of what is randomised
   std::int64_t steps_planned = 0;
   StepsReport run;
   std::int64_t sampled_every = 1;  // steps between samples of energy and momentum

@@ -27,7 +27,7 @@ using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
                                       "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
-                                      "inertia"};
+                                      "inertia", "randomize"};
 const std::vector<std::string> kModel{"model",    "base",       "name",     "parent", "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
@@ -70,6 +70,8 @@ class SceneReader {
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
       if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
+    scene_.seed = read_seed(initial, given_).value_or(kDefaultSeed);
+    if (const auto randomize = root_.find("randomize")) read_randomize(*randomize);
     return std::move(scene_);
   }
 
@@ -105,6 +107,14 @@ class SceneReader {
     if (found.moved.empty()) return;
     scene_.initial.positions = std::move(found.positions);
     for (const std::string& moved : found.moved) scene_.model.warnings.push_back(fmt::format("{}: {}", place, moved));
+  }
+
+  void read_randomize(const SceneValue& at) {
+    constexpr const char* kRange = "a number, or a pair [low, high]";
+    for (const auto& [key, value] : at.entries_of(randomized_names())) {
+      const std::vector<double> numbers = value.is(Kind::list) ? value.numbers(2, kRange) : std::vector{value.number(kRange)};
+      value.located([&] { set_range(scene_.randomization, key, numbers, scene_.effects); });
+    }
   }
 
   void warn_of_stiff_ground(const SceneValue& at) {

@@ -20,6 +20,9 @@
 //   start            checked (default): a start outside limits, against ties or in the ground is refused where it begins to move
 //                    (engine/start_check.hpp); as given: it begins there all the same
 //   effects          engine/scene/scene_effects.hpp; gravity is one of them: without its key there is none
+//   randomize        {masses, friction, joint_friction, gains}, each p or [low, high]: what is drawn for each instance of a rollout, uniformly
+//                    and by its seed, and for the one of a run by the seed of `initial` (engine/randomization.hpp). p is a factor from 1 - p
+//                    to 1 + p; [low, high] are factors too, of `friction`, which is the ground's, values
 //
 // A floating model starts at its position and rotation, a fixed one sits there.
 // Whatever is wrong - a key or a name that is not known, a value of the wrong kind or one that makes no sense - throws InputError

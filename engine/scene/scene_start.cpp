@@ -172,21 +172,24 @@ std::vector<Index> floating_roots(const Model& model) {
   return slots;
 }
 
+std::optional<std::uint64_t> read_seed(const std::optional<SceneValue>& at, const SceneStart& given) {
+  constexpr double kMostSeed = 9007199254740992.0;  // whole numbers beyond it have no double of their own
+  const auto value = at ? at->find("seed") : std::nullopt;
+  if (!value) return given.seed;
+  const double number = value->not_negative();
+  if (number != std::floor(number) || number > kMostSeed) value->refuse("a whole number, zero or more", "change it");
+  return given.seed ? given.seed : static_cast<std::uint64_t>(number);
+}
+
 InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
                         const SceneStart& given, std::span<const JointLimit> limits) {
-  constexpr double kMostSeed = 9007199254740992.0;  // whole numbers beyond it have no double of their own
-  std::optional<std::uint64_t> seed = given.seed;
   std::optional<double> spread = given.spread;
   const bool any = at && !at->is(SceneValue::Kind::nothing);
   if (any) {
     at->entries_of(kKeys);
-    if (const auto value = at->find("seed")) {
-      const double number = value->not_negative();
-      if (number != std::floor(number) || number > kMostSeed) value->refuse("a whole number, zero or more", "change it");
-      if (!seed) seed = static_cast<std::uint64_t>(number);
-    }
     if (const auto value = at->find("spread")) spread = spread.value_or(value->not_negative());
   }
+  const std::optional<std::uint64_t> seed = read_seed(at, given);
   InitialState state{model.neutral(), std::vector<double>(static_cast<std::size_t>(model.tree.shape.velocities), 0.0)};
   if (seed || spread) state = random_state(model, seed.value_or(kDefaultSeed), spread.value_or(kDefaultSpread), limits);
   Start start(model, std::move(state));

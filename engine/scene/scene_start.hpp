@@ -46,6 +46,9 @@ struct PlacedBase {
 /// Slots of the free joints that hang on the world.
 std::vector<Index> floating_roots(const Model& model);
 
+/// The seed that a scene or a command line names.
+std::optional<std::uint64_t> read_seed(const std::optional<SceneValue>& at, const SceneStart& given);
+
 /// `at`: the scene's `initial`, where it has one; `limits`: in effect, which random positions keep. Throws InputError with file and line.
 InitialState read_start(const std::optional<SceneValue>& at, const Model& model, const std::vector<PlacedBase>& bases,
                         const SceneStart& given, std::span<const JointLimit> limits = {});

@@ -55,6 +55,8 @@ struct Block {
   const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
   const Real* targets;        // [servos] targets of each instance, NaN: of the plan's table; null: the plan's
   const Real* frictions;      // [frictions] forces of each instance; null: the plan's
+  const Real* gains;          // [servos] factors of stiffness and damping of each instance; null: 1
+  const Real* ground_friction;  // Coulomb's coefficient of each instance; null: the plan's
   Real* excess_before;        // [nv] see EffectMemory; null: no effects
   Real* reading;              // [nv] likewise
   Real* bend;                 // [nv] likewise

@@ -179,7 +179,8 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
     const auto inertia = [&](Index row) { return felt[static_cast<std::size_t>(row)]; };
     for (const JointDamping& damper : effects.damping) damping_share.push_back(begin_share(h * damper.coefficient / inertia(damper.row)));
     for (const Servo& servo : effects.servos) {
-      servo_share.push_back(begin_share((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row)));
+      servo_ratio.push_back((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row));
+      servo_share.push_back(begin_share(servo_ratio.back()));
     }
   }
   const auto mass = [&](Index slot) { return moved_mass(model, slot); };

@@ -58,6 +58,7 @@ struct EffectPlan {
 
   Field<Index> q_row;               // position row of a screw's velocity row
   std::vector<double> damping_share, servo_share, drag_share;
+  std::vector<double> servo_ratio;  // of which servo_share is the begin_share: it goes with the gains
   Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
   GroundPlan ground;                // no points without ground

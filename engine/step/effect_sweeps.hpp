@@ -69,6 +69,23 @@ LINDEN_INLINE S at_each_time(const LaneTimes<S>& times, const Function& f) {
   }
 }
 
+/// The same of each lane's time and a number of its own.
+template <class S, class Function>
+LINDEN_INLINE S at_each_time(const LaneTimes<S>& times, const S& numbers, const Function& f) {
+  if constexpr (std::is_arithmetic_v<S>) {
+    return static_cast<S>(f(times[0], numbers));
+  } else {
+    using Real = typename ElementOf<S>::type;
+    std::array<Real, kLanesOf<S>> own, each;
+    numbers.store_unaligned(own.data());
+    for (std::size_t l = 0; l < each.size(); ++l) {
+      const bool again = l > 0 && times[l] == times[l - 1] && own[l] == own[l - 1];
+      each[l] = again ? each[l - 1] : static_cast<Real>(f(times[l], static_cast<double>(own[l])));
+    }
+    return S::load_unaligned(each.data());
+  }
+}
+
 /// How far a solve is when states are revised: its residual is small; it is solved; it has been revised so often that of what sticks too
 /// hard one alone begins to slide; and so often that of limits too one alone changes.
 template <class Mask>
@@ -86,13 +103,13 @@ class EffectSweeps {
     if (plan.joints) {
       rows(force_, effects.torques.size());
       servos_.entries = effects.servos;
-      servos_.share = plan.servo_share;
-      rows(servos_.mode, effects.servos.size());
-      rows(servos_.lead, effects.servos.size());
-      rows(servos_.target, effects.servos.size());
-      rows(set_targets_, effects.servos.size());
+      for (Field<S>* field : {&servos_.stiffness, &servos_.damping, &servos_.share, &servos_.end_share, &servos_.mode, &servos_.lead,
+                              &servos_.target, &set_targets_, &gains_}) {
+        rows(*field, effects.servos.size());
+      }
       for (std::size_t k = 0; k < effects.servos.size(); ++k) {
         const Servo& servo = effects.servos[k];
+        set_gain(static_cast<Index>(k), S(1.0));
         set_targets_(static_cast<Index>(k)) = as<S>(servo.target_moves() ? std::numeric_limits<double>::quiet_NaN() : servo.target);
       }
       frictions_.entries = effects.friction;
@@ -117,6 +134,7 @@ class EffectSweeps {
       bodies_.allocate(tree_.shape);
       clear_bodies();
       points_.allocate({.slots = static_cast<Index>(plan.ground.points.size())});
+      ground_friction_ = as<S>(plan.ground.ground.friction);
       drags_.entries = effects.drag;
       drags_.share = plan.drag_share;
       drags_.wind = {effects.wind[0], effects.wind[1], effects.wind[2]};
@@ -166,6 +184,22 @@ class EffectSweeps {
   /// To be written between steps; not a number: the target is that of the servo's table.
   Field<S>& servo_targets() { return set_targets_; }
   Field<S>& friction_forces() { return frictions_.force; }
+  /// Factor of each servo's stiffness and damping; set_gain between steps. With it goes how implicit they are taken.
+  const Field<S>& gains() const { return gains_; }
+  void set_gain(Index k, const S& factor) {
+    using std::max;
+    const auto at = static_cast<std::size_t>(k);
+    const S half(0.5), one(1.0);
+    const auto plain = factor == one;
+    gains_(k) = factor;
+    servos_.stiffness(k) = as<S>(plan_.effects.servos[at].stiffness) * factor;
+    servos_.damping(k) = as<S>(plan_.effects.servos[at].damping) * factor;
+    const S share = max(half, one - half / (as<S>(plan_.servo_ratio[at]) * factor));
+    servos_.share(k) = select(plain, as<S>(plan_.servo_share[at]), share);
+    servos_.end_share(k) = select(plain, as<S>(1 - plan_.servo_share[at]), one - share);
+  }
+  /// Coulomb's coefficient of the ground, to be written between steps.
+  S& ground_friction() { return ground_friction_; }
 
   /// After placements changed. Returns the potential energy of springs and of the ground at q [J].
   S refresh(const Field<S, 12>& placement, const Field<S>& q) {
@@ -225,7 +259,7 @@ class EffectSweeps {
       clear_body(bodies_, body.slot);
       drag_map(drags_, body.drag.first, body.drag.last, constants, h_, displacement, bodies_, impulse);
       wrench_map(wrenches_, body.wrenches.first, body.wrenches.last, h_, displacement, bodies_, impulse);
-      ground_map(plan_.ground, body.points.first, body.points.last, h_, creep_, displacement, points_, bodies_, impulse);
+      ground_map(plan_.ground, body.points.first, body.points.last, ground_friction_, h_, creep_, displacement, points_, bodies_, impulse);
     }
   }
   /// Before the first of them: which points slide, as the first guess and the last step have it.
@@ -497,7 +531,7 @@ class EffectSweeps {
          wrench_map(wrenches_, body.wrenches.first, body.wrenches.last, h_, work.displacement, bodies_, work.impulse);
        }));
     on(points, "ground_map", on_bodies([this, &work](const TouchedBody& body) {
-         ground_map(plan_.ground, body.points.first, body.points.last, h_, 0.0, work.displacement, points_, bodies_, work.impulse);
+         ground_map(plan_.ground, body.points.first, body.points.last, ground_friction_, h_, 0.0, work.displacement, points_, bodies_, work.impulse);
        }));
     on(plan_.joints, "joint_impulses_map", [=, this, &work] { joint_impulses_map(sum_, work.delta, work.momentum_target); });
     on(!effects.ball_springs.empty(), "ball_spring_map",
@@ -521,13 +555,15 @@ class EffectSweeps {
   void begin_servo_tables(const LaneTimes<S>& times, double step) {
     for (Index k = 0; k < servos_.mode.rows(); ++k) {
       const Servo& servo = plan_.effects.servos[static_cast<std::size_t>(k)];
-      servos_.lead(k) = at_each_time<S>(times, [&](double t) LINDEN_INLINE_LAMBDA {
-        return servo.damping * servo.target_velocity.mean(t, t + step) + servo.feedforward.mean(t, t + step);
+      servos_.lead(k) = at_each_time<S>(times, gains_(k), [&](double t, double gain) LINDEN_INLINE_LAMBDA {
+        return gain * servo.damping * servo.target_velocity.mean(t, t + step) + servo.feedforward.mean(t, t + step);
       });
       if (!servo.target_moves()) continue;
-      const double gone = 2 * servos_.share[static_cast<std::size_t>(k)] - 1;
-      const S moving = at_each_time<S>(
-          times, [&](double t) LINDEN_INLINE_LAMBDA { return servo.target_over_time.mean(t + gone * step, t + step); });
+      const double ratio = plan_.servo_ratio[static_cast<std::size_t>(k)];
+      const S moving = at_each_time<S>(times, gains_(k), [&](double t, double gain) LINDEN_INLINE_LAMBDA {
+        const double gone = 2 * begin_share(gain * ratio) - 1;
+        return servo.target_over_time.mean(t + gone * step, t + step);
+      });
       const S& given = set_targets_(k);
       servos_.target(k) = select(given == given, given, moving);
     }
@@ -566,12 +602,14 @@ class EffectSweeps {
   JointImpulses<S> sum_;
   Servos<S> servos_;
   Field<S> set_targets_;  // of each servo, from outside; not a number where its table says
+  Field<S> gains_;        // likewise: factor of its stiffness and damping
   Frictions<S> frictions_;
   Limits<S> limits_;
   GivenMotions<S> motions_;
   Field<S> force_;  // of each given torque
   BodyImpulses<S> bodies_;
   GroundPoints<S> points_;
+  S ground_friction_ = S(0.0);
   Drags<S> drags_;
   Wrenches<S> wrenches_;
   S ground_potential_ = S(0.0), ground_before_ = S(0.0);

@@ -32,6 +32,8 @@ class InstanceStepper {
   /// Targets of the plan's servos, to be written.
   std::span<double> servo_targets() { return stepper_->servo_targets(); }
   std::span<double> friction_forces() { return stepper_->friction_forces(); }
+  void set_gain(Index k, double factor) { stepper_->set_gain(k, factor); }
+  void set_ground_friction(double coefficient) { stepper_->set_ground_friction(coefficient); }
 
   /// One step of the state, from `time` on. The latest row of state().history and state().last_step say what is known of the step before.
   StepReport step(double time);

@@ -1,6 +1,6 @@
 // engine/step/lane_effects.hpp
 // The effects of a block of instances: what a step of lanes asks of effect_sweeps.hpp, with what is each instance's own - time, targets,
-// friction, how its contact points ended the last step.
+// gains, friction, how its contact points ended the last step.
 #pragma once
 
 #include <algorithm>
@@ -36,6 +36,8 @@ class LaneEffects {
     };
     load(block.targets, sweeps_.servo_targets());
     load(block.frictions, sweeps_.friction_forces());
+    for (Index k = 0; block.gains != nullptr && k < sweeps_.gains().rows(); ++k) sweeps_.set_gain(k, L::load(block.gains + k * W));
+    if (block.ground_friction != nullptr) sweeps_.ground_friction() = L::load(block.ground_friction);
     load(block.excess_before, sweeps_.excess_before());
     load(block.reading, sweeps_.reading());
     load(block.bend, sweeps_.bend());
@@ -98,9 +100,18 @@ class LaneEffects {
     for (Index row = 0; row < v.rows(); ++row) v(row) = sweeps_.within_bend(row, v(row), rate * last_displacement(block.past + row * words));
   }
 
-  /// What effects keep of lane l, for it to be stepped alone; and of the step that it took so. Contact points ended the step before as the
+  /// What is lane l's own, and what effects keep of it, for it to be stepped alone; and of the step that it took so. Contact points ended the step before as the
   /// block has them, whatever lanes that are solved together have made of them since.
   void take_out(const Block<Real>& block, int l, InstanceStepper& alone) {
+    const auto take = [&](const Field<Pack>& from, std::span<double> to) {
+      for (std::size_t row = 0; row < to.size(); ++row) to[row] = static_cast<double>(L::lane(from(static_cast<Index>(row)), l));
+    };
+    if (block.targets != nullptr) take(sweeps_.servo_targets(), alone.servo_targets());
+    if (block.frictions != nullptr) take(sweeps_.friction_forces(), alone.friction_forces());
+    for (Index k = 0; block.gains != nullptr && k < sweeps_.gains().rows(); ++k) {
+      alone.set_gain(k, static_cast<double>(L::lane(sweeps_.gains()(k), l)));
+    }
+    if (block.ground_friction != nullptr) alone.set_ground_friction(static_cast<double>(L::lane(sweeps_.ground_friction(), l)));
     const EffectMemory memory = alone.effect_memory();
     for (std::size_t row = 0; row < memory.reading.size(); ++row) {
       memory.excess_before[row] = static_cast<double>(L::lane(sweeps_.excess_before()(static_cast<Index>(row)), l));

@@ -410,11 +410,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     take(q_, state.q.flat());
     take(p_, state.p.flat());
     if (has_applied_) take(applied_, alone_.applied());
-    if constexpr (kEffects) {
-      if (block.targets != nullptr) take(effects_->servo_targets(), alone_.servo_targets());
-      if (block.frictions != nullptr) take(effects_->friction_forces(), alone_.friction_forces());
-      effects_.take_out(block, l, alone_);
-    }
+    if constexpr (kEffects) effects_.take_out(block, l, alone_);
     if constexpr (kOwnMasses) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
       for (Index i = 0; i < inertia.rows(); ++i) {

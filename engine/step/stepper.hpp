@@ -63,6 +63,9 @@ class Stepper {
   virtual std::span<double> servo_targets() = 0;
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
   virtual std::span<double> friction_forces() = 0;
+  /// Factor of the stiffness and damping of servo k; Coulomb's coefficient of the ground. Likewise.
+  virtual void set_gain(Index k, double factor) = 0;
+  virtual void set_ground_friction(double coefficient) = 0;
   /// What effects keep of the step taken last; written where it is that of another state. Empty without effects.
   virtual EffectMemory effect_memory() = 0;
   /// Number k of EffectSweeps::kept, likewise.

@@ -262,6 +262,16 @@ std::span<double> TreeStepper<kEffects>::friction_forces() {
 }
 
 template <bool kEffects>
+void TreeStepper<kEffects>::set_gain([[maybe_unused]] Index k, [[maybe_unused]] double factor) {
+  if constexpr (kEffects) effects_.set_gain(k, factor);
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::set_ground_friction([[maybe_unused]] double coefficient) {
+  if constexpr (kEffects) effects_.ground_friction() = coefficient;
+}
+
+template <bool kEffects>
 void TreeStepper<kEffects>::clear_account() {
   account_ = {};
   if constexpr (kEffects) {

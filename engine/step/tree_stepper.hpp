@@ -43,6 +43,8 @@ class TreeStepper final : public Stepper {
   const StepImpulses& impulses() const override;
   std::span<double> servo_targets() override;
   std::span<double> friction_forces() override;
+  void set_gain(Index k, double factor) override;
+  void set_ground_friction(double coefficient) override;
   EffectMemory effect_memory() override;
   double kept(Index k) const override;
   void set_kept(Index k, double number) override;

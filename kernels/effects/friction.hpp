@@ -139,7 +139,7 @@ void friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& re
     const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
     const S held = -residual(friction.row) / (h * h), sliding = frictions.force(k) * frictions.mode(k);
     const S force = select(frictions.mode(k) == S(0.0), held, sliding);
-    each(friction.row, force * worked(1, delta(friction.row), before(friction.row)));
+    each(friction.row, force * worked(1.0, delta(friction.row), before(friction.row)));
   }
 }
 

@@ -77,7 +77,7 @@ S motion_work(const GivenMotions<S>& motions, const S& h, const Field<S>& residu
   for (Index k = 0; k < motions.end.rows(); ++k) {
     const Index row = motions.row(k);
     const S steady = steady_force(motions, k, motions.per_force * residual(row));
-    sum = sum + residual(row) * worked(1, delta(row), before(row)) / (h * h);
+    sum = sum + residual(row) * worked(1.0, delta(row), before(row)) / (h * h);
     sum = sum + S(0.5) * h * (steady * motions.next_velocity(k) - motions.steady(k) * motions.velocity(k));
   }
   return sum;

@@ -530,11 +530,11 @@ struct FrictionForce {
 
 /// `slides` is set where friction is smooth.
 template <class S>
-FrictionForce<S> friction_force(const GroundPlan& plan, const S& h, double creep, const S& gap, const NormalForce<S>& normal, const Vec3<S>& t,
+FrictionForce<S> friction_force(const GroundPlan& plan, const S& mu, const S& h, double creep, const S& gap, const NormalForce<S>& normal, const Vec3<S>& t,
                                 S& slides) {
   using std::max;
   using std::sqrt;
-  const S zero(0.0), one(1.0), mu = as<S>(plan.ground.friction), N = normal.push();
+  const S zero(0.0), one(1.0), N = normal.push();
   const S length = sqrt(dot(t, t));
   if (creep > 0) slides = select(length > h * as<S>(creep), one, zero);
   const auto closed = normal.closed > zero, sliding = slides > zero, by_load = sliding || as<S>(creep) > zero;
@@ -596,10 +596,10 @@ LINDEN_INLINE void add_jacobian(const GroundPoint& point, const S& scale, const 
   (Mat6<S>::from(sum.pull.row(i)) + K).to(sum.pull.row(i));
 }
 
-/// Points first ... last - 1, all of one body.
+/// Points first ... last - 1, all of one body. mu: Coulomb's coefficient, of each instance its own.
 template <class S>
-void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& h, double creep, const Field<S, 7>& displacement,
-                GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
+void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& mu, const S& h, double creep,
+                const Field<S, 7>& displacement, GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
   if (first == last) return;
   using std::max;
   using std::sqrt;
@@ -641,7 +641,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const S stiff = weight * as<S>(ground.stiffness), loss = weight * (rate * as<S>(ground.damping)) + (share - half) * stiff;
     const NormalForce<S> normal = normal_force(stiff, loss, gap, meeting.gap.rise, meeting.slip.rise);
     S slides = points.slides(k);
-    const FrictionForce<S> friction = friction_force(plan, h, creep, gap, normal, meeting.slip.along, slides);
+    const FrictionForce<S> friction = friction_force(plan, mu, h, creep, gap, normal, meeting.slip.along, slides);
     points.slides(k) = slides;
 
     const Vec3<S> a = c + meeting.arm, &n = meeting.normal;

@@ -51,15 +51,18 @@ void clear(JointImpulses<S>& sum) {
   }
 }
 
-/// J = -(o + g delta) / h on one row.
+/// J = -(o + g delta) / h on one row, shares of it at the beginning and at the end.
 template <class S>
-LINDEN_INLINE void add_impulse(JointImpulses<S>& sum, Index row, double share, const S& o, const S& g) {
-  const S begin = as<S>(share), end = as<S>(1 - share);
+LINDEN_INLINE void add_impulse(JointImpulses<S>& sum, Index row, const S& begin, const S& end, const S& o, const S& g) {
   sum.offset(row) = sum.offset(row) + begin * o;
   sum.gain(row) = sum.gain(row) + begin * g;
   sum.stiffness(row) = sum.stiffness(row) + begin * g;
   sum.end_offset(row) = sum.end_offset(row) - end * o;
   sum.end_gain(row) = sum.end_gain(row) - end * g;
+}
+template <class S>
+LINDEN_INLINE void add_impulse(JointImpulses<S>& sum, Index row, double share, const S& o, const S& g) {
+  add_impulse(sum, row, as<S>(share), as<S>(1 - share), o, g);
 }
 
 template <class S, class Mask>
@@ -73,10 +76,10 @@ void joint_impulses_map(const JointImpulses<S>& sum, const Field<S>& delta, Fiel
   for (Index row = 0; row < target.rows(); ++row) target(row) = sum.plain_target(row) - (sum.offset(row) + sum.gain(row) * delta(row));
 }
 
-/// Displacement that an impulse works along.
-template <class S>
-LINDEN_INLINE S worked(double share, const S& delta, const S& before) {
-  return delta - as<S>(share - 0.5) * (delta - before);
+/// Displacement that an impulse works along; share: a number, or one of each instance.
+template <class Share, class S>
+LINDEN_INLINE S worked(const Share& share, const S& delta, const S& before) {
+  return delta - as<S>(share - Share(0.5)) * (delta - before);
 }
 
 /// The smaller of two numbers of one sign, else zero: of an impulse, what lasted from step to step, without what an impact gave.

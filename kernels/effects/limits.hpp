@@ -133,7 +133,7 @@ template <class S, class Each>
 void limit_loss(const Limits<S>& limits, const S& h, const Field<S>& residual, const Field<S>& delta, const Field<S>& before, const Each& each) {
   for (Index k = 0; k < limits.mode.rows(); ++k) {
     const Index row = limits.entries[static_cast<std::size_t>(k)].row;
-    each(row, select(limits.mode(k) != S(0.0), -residual(row) * worked(1, delta(row), before(row)) / (h * h), S(0.0)));
+    each(row, select(limits.mode(k) != S(0.0), -residual(row) * worked(1.0, delta(row), before(row)) / (h * h), S(0.0)));
   }
 }
 

@@ -14,6 +14,8 @@
 // Which of the two holds is settled within the solve: `mode` is 0, 1 or -1 (at the limit, pushing up or down) and is revised until it is
 // that of the solution.
 //
+// k, c and s are each instance's own: gains may differ from one to the next.
+//
 // units   k [N m/rad, N/m], c [N m s/rad, N s/m], most [N m, N]
 // energy  work of the force: force x worked a step, given or taken
 // cost    some 6 operations an entry and step, 3 an evaluation
@@ -29,10 +31,12 @@ namespace linden {
 template <class S>
 struct Servos {
   std::span<const Servo> entries;
-  std::span<const double> share;  // s of each
-  Field<S> target;                // of each [rad, m]
-  Field<S> mode;                  // of each
-  Field<S> lead;                  // of each [N m, N]
+  // of each
+  Field<S> stiffness, damping;  // k [N m/rad, N/m], c [N m s/rad, N s/m]
+  Field<S> share, end_share;    // s, 1 - s
+  Field<S> target;              // [rad, m]
+  Field<S> mode;
+  Field<S> lead;  // [N m, N]
 };
 
 /// o and g as if there were no limit, and the limit of |o + g delta|.
@@ -44,9 +48,9 @@ struct ServoLaw {
 template <class S>
 LINDEN_INLINE ServoLaw<S> servo_law(const Servos<S>& servos, Index k, const Field<Index>& q_row, const S& h, const Field<S>& q) {
   const Servo& servo = servos.entries[static_cast<std::size_t>(k)];
-  const S stiff = h * h * as<S>(servo.stiffness);
+  const S stiff = h * h * servos.stiffness(k);
   return {stiff * (q(q_row(servo.row)) - servos.target(k)) - h * h * servos.lead(k),
-          as<S>(servos.share[static_cast<std::size_t>(k)]) * stiff + h * as<S>(servo.damping), h * h * as<S>(servo.max_force)};
+          servos.share(k) * stiff + h * servos.damping(k), h * h * as<S>(servo.max_force)};
 }
 
 template <class S>
@@ -55,8 +59,8 @@ void servo_map(const Servos<S>& servos, const Field<Index>& q_row, const S& h, c
   for (Index k = 0; k < servos.mode.rows(); ++k) {
     const auto [o, g, most] = servo_law(servos, k, q_row, h, q);
     const auto free = servos.mode(k) == zero;
-    const std::size_t at = static_cast<std::size_t>(k);
-    add_impulse(sum, servos.entries[at].row, servos.share[at], select(free, o, -servos.mode(k) * most), select(free, g, zero));
+    add_impulse(sum, servos.entries[static_cast<std::size_t>(k)].row, servos.share(k), servos.end_share(k),
+                select(free, o, -servos.mode(k) * most), select(free, g, zero));
   }
 }
 
@@ -83,10 +87,9 @@ S servo_work(const Servos<S>& servos, const Field<Index>& q_row, const S& h, con
   S sum(0.0);
   for (Index k = 0; k < servos.mode.rows(); ++k) {
     const auto [o, g, most] = servo_law(servos, k, q_row, h, q);
-    const std::size_t at = static_cast<std::size_t>(k);
-    const Index row = servos.entries[at].row;
+    const Index row = servos.entries[static_cast<std::size_t>(k)].row;
     const S& d = delta(row);
-    sum = sum + select(servos.mode(k) == zero, -(o + g * d), servos.mode(k) * most) * worked(servos.share[at], d, before(row));
+    sum = sum + select(servos.mode(k) == zero, -(o + g * d), servos.mode(k) * most) * worked(servos.share(k), d, before(row));
   }
   return sum / (h * h);
 }

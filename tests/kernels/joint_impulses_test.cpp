@@ -80,8 +80,13 @@ void check_force(const Effect& effect, double share, const std::function<double(
 
 const double kShares[] = {0.5, 0.7, 1.0};
 
-Servos<double> one_servo(const std::vector<Servo>& entries, const std::vector<double>& share, double mode, double lead) {
-  Servos<double> servos{entries, share, {}, {}, {}};
+Servos<double> one_servo(const std::vector<Servo>& entries, double share, double mode, double lead) {
+  Servos<double> servos;
+  servos.entries = entries;
+  servos.stiffness.allocate(1, entries[0].stiffness);
+  servos.damping.allocate(1, entries[0].damping);
+  servos.share.allocate(1, share);
+  servos.end_share.allocate(1, 1 - share);
   servos.target.allocate(1, entries[0].target);
   servos.mode.allocate(1, mode);
   servos.lead.allocate(1, lead);
@@ -121,11 +126,10 @@ TEST_CASE("each joint effect puts its force at both ends of a step, and its deri
     const std::vector<Servo> entries{{.row = kRow, .stiffness = 50, .damping = 2, .target = -0.4, .max_force = 11}};
     for (const double share : kShares) {
       for (const double mode : {0.0, 1.0, -1.0}) {
-        const std::vector<double> shares{share};
         INFO("mode " << mode);
         check_force(
             [&](auto& row) {
-              const Servos<double> servos = one_servo(entries, shares, mode, 3);
+              const Servos<double> servos = one_servo(entries, share, mode, 3);
               servo_map(servos, row.q_row, kStep, row.q, row.sum);
             },
             share, [&](double q, double rate) { return mode == 0 ? 50 * (-0.4 - q) - 2 * rate + 3 : mode * 11; });
@@ -378,7 +382,6 @@ TEST_CASE("a ball joint's spring pulls as its potential falls") {
 TEST_CASE("joint effects treat all lanes alike and allocate nothing") {
   static const std::vector<Servo> kServos{{.row = kRow, .stiffness = 50, .damping = 2, .max_force = 11}};
   static const std::vector<JointFriction> kFrictions{{.row = kRow, .force = 5}};
-  static const std::vector<double> kShare{0.7};
   Random random(5);
   std::vector<std::array<double, 5>> samples;  // position, displacement, target, force of friction, residual
   for (int k = 0; k < 64; ++k) {
@@ -387,7 +390,12 @@ TEST_CASE("joint effects treat all lanes alike and allocate nothing") {
   }
   const auto rig = []<class S>(S) {
     JointRow<S> row;
-    Servos<S> servos{kServos, kShare, {}, {}, {}};
+    Servos<S> servos;
+    servos.entries = kServos;
+    servos.stiffness.allocate(1, S(kServos[0].stiffness));
+    servos.damping.allocate(1, S(kServos[0].damping));
+    servos.share.allocate(1, S(0.7));
+    servos.end_share.allocate(1, S(0.3));
     Frictions<S> frictions{kFrictions, {}, {}};
     Field<S> residual;
     for (Field<S>* field : {&servos.target, &servos.mode, &servos.lead, &frictions.force, &frictions.mode}) field->allocate(1);
