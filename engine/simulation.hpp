@@ -95,6 +95,7 @@ class Simulation {
   StepReport step();
   /// So many steps, or fewer where one fails: the same motion to the last bit. A large tree is gone over once less a step so.
   StepsReport run(std::int64_t steps);
+  /// describe(const StepsReport&) tells of steps that were split.
   std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
 
   /// From the next step on it is kept what effects applied, at the cost of a pass up the tree a step where something acts on bodies. What

@@ -129,7 +129,7 @@ void StartCheck::look_at_limits(StartFindings& found) const {
       continue;
     }
     found.faults.push_back(fmt::format("joint {} is at {:.10g} {}, outside its limits ({})", name, q, unit, range_text(limit.lower, limit.upper, unit)));
-    lines.push_back(fmt::format("{}: {:.10g}", model_.names.velocity[at(limit.row)], bound));
+    lines.push_back(fmt::format("{}: {}", model_.names.velocity[at(limit.row)], text_of(bound)));
   }
   if (!lines.empty()) {
     found.advice.push_back(fmt::format("write initial: {{positions: {{{}}}}} or what else lies within, or change effects.limits", fmt::join(lines, ", ")));

@@ -27,7 +27,7 @@ void StepsReport::add(const StepReport& step) {
     one.evaluations = step.evaluations;
     one.factorisations = step.factorisations;
     one.substeps = step.substeps;
-    one.split_steps = step.substeps > 1 ? 1 : 0;
+    one.split_steps = one.splits_in_a_row = one.first_splits = one.last_splits = step.substeps > 1 ? 1 : 0;
     one.floor_steps = step.at_rounding_floor ? 1 : 0;
     one.largest_residual = step.residual;
   }
@@ -35,6 +35,9 @@ void StepsReport::add(const StepReport& step) {
 }
 
 void StepsReport::add(const StepsReport& more) {
+  splits_in_a_row = std::max({splits_in_a_row, more.splits_in_a_row, last_splits + more.first_splits});
+  if (first_splits == steps) first_splits += more.first_splits;
+  last_splits = more.last_splits == more.steps ? last_splits + more.last_splits : more.last_splits;
   steps += more.steps;
   iterations += more.iterations;
   evaluations += more.evaluations;
@@ -45,6 +48,13 @@ void StepsReport::add(const StepsReport& more) {
   floor_steps += more.floor_steps;
   largest_residual = std::max(largest_residual, more.largest_residual);
   last = more.last;
+}
+
+std::string describe(const StepsReport& report) {
+  if (report.split_steps == 0) return {};
+  const std::string in_a_row = report.splits_in_a_row > 1 ? fmt::format(", {} of them in a row", report.splits_in_a_row) : "";
+  return fmt::format("{} of {} {} split{}, {} sub-steps in all: a smaller step keeps energy better", report.split_steps, report.steps,
+                     report.split_steps == 1 ? "steps was" : "steps were", in_a_row, report.substeps);
 }
 
 std::string describe(const StepReport& report, const Model& model, double step) {

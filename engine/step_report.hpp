@@ -40,6 +40,8 @@ struct StepsReport {
   std::int64_t iterations = 0, evaluations = 0, factorisations = 0, substeps = 0;
   int most_iterations = 0;
   std::int64_t split_steps = 0, floor_steps = 0;  // that were split; that ended at the rounding floor
+  std::int64_t splits_in_a_row = 0;               // the most
+  std::int64_t first_splits = 0, last_splits = 0;  // in a row, at the beginning and at the end
   double largest_residual = 0;
   StepReport last;  // of the last step, or of the one that failed
 
@@ -47,6 +49,9 @@ struct StepsReport {
   void add(const StepsReport& more);
   bool ok() const { return last.ok(); }
 };
+
+/// One sentence on steps that were split; empty where none was.
+std::string describe(const StepsReport& report);
 
 /// One sentence: what failed, at which body and joint, by how much, and what to do. Empty for a step that converged.
 std::string describe(const StepReport& report, const Model& model, double step);

@@ -97,13 +97,14 @@ class Merger {
   void place_ground(std::size_t part, std::vector<bool>& placed) {
     if (placed[part]) return;
     Ground& ground = ground_[part];
+    if (!parts_[part].parent.empty()) place_ground(ground.part, placed);
     if (!parts_[part].parent.empty() && ground.slot == 0) {
-      place_ground(ground.part, placed);
       const Ground& below = ground_[ground.part];
       ground = {below.part, below.slot, below.pose * ground.pose};
     }
     ground.pose = ground.pose * parts_[part].pose;
     placed[part] = true;
+    part_order_.push_back(part);
   }
 
   template <class Links>
@@ -120,18 +121,19 @@ class Merger {
   }
 
   void sort_bodies() {
-    std::vector<Index> before;
+    std::vector<Index> before(parts_.size());
     Index count = 0;
-    for (const PlacedModel& part : parts_) {
-      before.push_back(count);
-      count += part.model.tree.bodies();
+    for (const std::size_t part : part_order_) {
+      before[part] = count;
+      count += parts_[part].model.tree.bodies();
     }
+    new_slot_.resize(parts_.size());
     std::vector<Origin> bodies;
     std::vector<Index> parent;
     std::vector<JointKind> kind;
-    for (std::size_t part = 0; part < parts_.size(); ++part) {
+    for (const std::size_t part : part_order_) {
       const Tree& tree = parts_[part].model.tree;
-      new_slot_.emplace_back(static_cast<std::size_t>(tree.shape.slots), 0);
+      new_slot_[part].resize(static_cast<std::size_t>(tree.shape.slots), 0);
       const auto body_of = [&](std::size_t of, Index slot) { return slot == 0 ? -1 : before[of] + slot - 1; };
       for (Index i = 1; i < tree.shape.slots; ++i) {
         bodies.push_back({part, i, tree.kind(i)});
@@ -276,7 +278,8 @@ class Merger {
   }
 
   const std::vector<PlacedModel>& parts_;
-  std::vector<Ground> ground_;  // [part]
+  std::vector<Ground> ground_;           // [part]
+  std::vector<std::size_t> part_order_;  // as in the list, but each after what it hangs from
   std::vector<Origin> order_;
   std::vector<std::vector<Index>> new_slot_;  // [part][slot]
   std::unordered_set<std::string> coordinates_;

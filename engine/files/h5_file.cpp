@@ -192,7 +192,7 @@ class H5File final : public ArrayFile {
   Handle create() {
     const Handle access = own(H5Pclose, [this] { return disk_.access(); });
     // no chunk waits in memory: what there is room for is asked row by row
-    call(H5Pset_cache, access.id(), 0, 1, 0, 1.0);
+    call(H5Pset_cache, access.id(), 0, std::size_t{1}, std::size_t{0}, 1.0);
     return own(H5Fclose, H5Fcreate, kWhole, H5F_ACC_TRUNC, H5P_DEFAULT, access.id());
   }
 

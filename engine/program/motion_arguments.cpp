@@ -85,8 +85,9 @@ std::string gravity_text(const Options& options) {
 LeftOut::LeftOut(const Model& model, const Effects& effects) {
   for (Index slot = 1; slot < model.tree.shape.slots; ++slot) {
     const Index row = model.tree.first_v(slot);
-    limits += std::isfinite(model.attributes.lower(row)) || std::isfinite(model.attributes.upper(row)) ? 1 : 0;
     damping += model.attributes.damping(row) > 0 ? 1 : 0;
+    if (std::ranges::find(effects.motions, row, &JointMotion::row) != effects.motions.end()) continue;  // it feels none of the others
+    limits += std::isfinite(model.attributes.lower(row)) || std::isfinite(model.attributes.upper(row)) ? 1 : 0;
     friction += model.attributes.friction(row) > 0 ? 1 : 0;
     velocity_limits += std::isfinite(model.attributes.max_velocity(row)) ? 1 : 0;
   }

@@ -16,10 +16,12 @@
 #include "engine/files/report_files.hpp"
 #include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
+#include "engine/program/effects_text.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/program/randomize.hpp"
 #include "engine/program/rollout_report.hpp"
+#include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
@@ -57,26 +59,24 @@ class Execution {
  public:
   Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
       : arguments_(arguments),
-        batch_(std::move(model), arguments.instances, arguments.options, arguments.effects()) {
+        model_(std::move(model)),
+        effects_(arguments.effects()),
+        batch_(model_, arguments.instances, arguments.options, effects_) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
-    const Randomness random = *randomness(arguments);
-    const Effects effects = arguments.effects();
-    DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, batch_.model(), effects, arguments.instances);
-    const auto randomize = [&](std::int64_t i, std::uint64_t seed) {
-      const DrawnNumbers numbers = draw(arguments.randomization, batch_.model(), effects, seed);
-      apply(numbers, effects, batch_, i);
+    DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, *model_, effects_, arguments.instances);
+    const auto randomize = [&](std::int64_t i) {
+      const DrawnNumbers numbers = drawn_of(i);
+      apply(numbers, effects_, batch_, i);
       drawn.set(i, numbers);
     };
-    if (arguments.randomization.any()) randomize(0, random.seed);  // makes room, before there are several threads
+    if (arguments.randomization.any()) randomize(0);  // makes room, before there are several threads
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
-      const std::uint64_t seed = random.seed + static_cast<std::uint64_t>(i);
-      const InitialState state = arguments.scene ? random_around(batch_.model(), arguments.scene->initial, seed, random.spread, arguments.scene->effects.limits)
-                                                 : random_state(batch_.model(), seed, random.spread);
+      const InitialState state = start_of(i);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
-      if (arguments.randomization.any()) randomize(i, seed);
+      if (arguments.randomization.any()) randomize(i);
     });
     look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
       const auto rows = batch_.positions().instance(i);
@@ -120,6 +120,7 @@ class Execution {
     if (looked_at_ != figures_.steps) look();
     if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
     finish();
+    if (figures_.signal == 0 && figures_.lost.empty()) account_of_one(interrupt);
   }
 
   /// Complaints go to stderr; true where there were none.
@@ -143,6 +144,54 @@ class Execution {
   RolloutFigures& figures() { return figures_; }
 
  private:
+  std::uint64_t seed_of(std::int64_t i) const { return randomness(arguments_)->seed + static_cast<std::uint64_t>(i); }
+  InitialState start_of(std::int64_t i) const {
+    const double spread = randomness(arguments_)->spread;
+    if (!arguments_.scene) return random_state(*model_, seed_of(i), spread);
+    return random_around(*model_, arguments_.scene->initial, seed_of(i), spread, effects_.limits);
+  }
+  DrawnNumbers drawn_of(std::int64_t i) const { return draw(arguments_.randomization, *model_, effects_, seed_of(i)); }
+
+  /// Of the first instance that runs.
+  void account_of_one(const Interrupt& interrupt) {
+    constexpr std::int64_t kMostSteps = 10'000, kSamples = 2'000;
+    if (effect_lines(effects_, *model_).empty()) return;
+    AccountOfOne one;
+    while (one.instance < arguments_.instances && batch_.record(one.instance).status != StepStatus::converged) ++one.instance;
+    if (one.instance == arguments_.instances) return;
+    std::shared_ptr<const Model> model = model_;
+    Effects effects = effects_;
+    if (arguments_.randomization.any()) {
+      const auto own = std::make_shared<Model>(*model_);
+      apply(drawn_of(one.instance), *own, effects);
+      model = own;
+    }
+    Simulation alone(model, arguments_.options, effects);
+    const InitialState start = start_of(one.instance);
+    alone.set_positions(start.positions);
+    alone.set_velocities(start.velocities);
+    const std::int64_t steps = std::min(figures_.steps, kMostSteps), stretch = (steps + kSamples - 1) / kSamples;
+    one.energy = EnergyDrift(steps / stretch + 1);
+    const auto sample = [&] {
+      one.taken = alone.effect_work().taken();
+      one.given = alone.effect_work().given();
+      one.energy.add(alone.time(), alone.energy(), one.taken, one.given);
+    };
+    sample();
+    while (one.steps < steps) {
+      if (interrupt.signal() != 0) return;
+      const StepsReport report = alone.run(std::min(stretch, steps - one.steps));
+      one.steps += report.steps;
+      sample();
+      if (!report.ok()) {
+        one.warnings.push_back(alone.describe(report.last));
+        break;
+      }
+    }
+    for (std::string& warning : energy_warnings(alone, one.energy)) one.warnings.push_back(std::move(warning));
+    figures_.account = std::move(one);
+  }
+
   void recording(const std::function<void()>& work) {
     try {
       work();
@@ -195,6 +244,8 @@ class Execution {
   }
 
   const RolloutArguments& arguments_;
+  std::shared_ptr<const Model> model_;
+  const Effects effects_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;
@@ -219,6 +270,11 @@ int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> mode
     tell("interrupted after {} of {} steps{}", grouped(figures.steps), grouped(figures.steps_planned),
                figures.frames > 0 ? fmt::format("; {} is valid up to there", arguments.record) : "");
     return 128 + figures.signal;
+  }
+  if (figures.account) {
+    for (const std::string& warning : figures.account->warnings) {
+      tell("warning: instance {} on its own: {}", grouped(figures.account->instance), warning);
+    }
   }
   if (!figures.lost.empty()) {
     tell("{}; {}; the rollout ended after {} of {} steps", figures.lost,

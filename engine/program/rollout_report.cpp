@@ -89,6 +89,19 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
     if (effect_lines(effects, model).empty()) row("energy", fmt::format("changes by {:+.1e} of the kinetic energy in the mean, {:.1e} in the median, {:.1e} at most (instance {})",
                               energy.mean, energy.median, energy.most, grouped(energy.worst)));
   }
+  if (const auto& one = figures.account) {
+    const double scale = one->energy.scale();
+    row("energy", fmt::format("of instance {} on its own, over {:.6g} s: effects took {:.6g} J and gave {:.6g} J, band {:.2e} J{}",
+                              grouped(one->instance), static_cast<double>(one->steps) * options.step, one->taken, one->given, one->energy.band(),
+                              scale > 0 ? fmt::format(" = {:.2e} of the largest kinetic energy", one->energy.band() / scale) : ""));
+  }
+  if (!effect_lines(effects, model).empty() && figures.summary.steps > 0) {
+    row("verdict", fmt::format("{} of {} frozen, {} of {} taken alone{}", grouped(figures.summary.frozen), counted(arguments.instances, "instance"),
+                               model.mimics.empty() ? grouped(figures.summary.rescued) : "all", counted(figures.summary.steps, "step"),
+                               !figures.account                    ? ""
+                               : figures.account->warnings.empty() ? ", the energy of that instance is accounted for"
+                                                                   : ", the energy of that instance is not accounted for"));
+  }
   if (figures.frames > 0) row("", printable(fmt::format("{}: {}", arguments.record, counted(figures.frames, "frame"))));
   if (figures.summary.frozen > 0) {
     row("frozen", fmt::format("{} at the last good state:", counted(figures.summary.frozen, "instance")));
@@ -143,6 +156,14 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"frames", figures.frames},
       {"failures", figures.summary.frozen},
       {"failure_texts", figures.failures},
+      {"account", !figures.account ? Json(nullptr)
+                                   : Json{{"instance", figures.account->instance},
+                                          {"steps", figures.account->steps},
+                                          {"energy_taken", figures.account->taken},
+                                          {"energy_given", figures.account->given},
+                                          {"energy_band", figures.account->energy.band()},
+                                          {"energy_scale", figures.account->energy.scale()},
+                                          {"warnings", figures.account->warnings}}},
       {"recording_failure", figures.lost.empty() ? Json(nullptr) : Json(figures.lost)},
       {"interrupted", figures.signal != 0},
       {"warnings", model.warnings},

@@ -3,12 +3,22 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "engine/drift.hpp"
 #include "engine/program/rollout_command.hpp"
 
 namespace linden {
+
+/// Of an instance on its own, from the same start: where effects act, a batch keeps no account of their work.
+struct AccountOfOne {
+  std::int64_t instance = 0, steps = 0;
+  EnergyDrift energy;  // of H plus what effects took less what they gave
+  double taken = 0, given = 0;        // [J]
+  std::vector<std::string> warnings;  // where its motion is not to be trusted
+};
 
 /// Counted while a rollout goes on.
 struct RolloutFigures {
@@ -19,6 +29,7 @@ struct RolloutFigures {
   BatchSummary summary;
   std::vector<double> first_energy, last_energy, most_kinetic;  // of each instance [J]
   std::vector<std::string> failures;                            // the first few, one sentence each
+  std::optional<AccountOfOne> account;                          // where effects act
   int signal = 0;                                               // that ended the rollout
   std::int64_t frames = 0;                                      // recorded
   std::string lost;                                             // why the recording ended early, and the rollout with it

@@ -41,8 +41,6 @@ std::string reduction_text(const Options& options) {
   return options.reduction > 0 ? fmt::format(" or {:g} of the first residual", options.reduction) : "";
 }
 
-std::string plural(std::int64_t number, const char* one, const char* more) { return number == 1 ? one : more; }
-
 }  // namespace
 
 std::vector<std::string> energy_warnings(const Simulation& simulation, const EnergyDrift& energy) {
@@ -96,10 +94,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   row("iterations", fmt::format("mean {:.2f}, largest {}; {:.2f} evaluations of the residual per step",
                                 mean(figures.run.iterations, figures.run.steps), figures.run.most_iterations,
                                 mean(figures.run.evaluations, figures.run.steps)));
-  if (figures.run.split_steps > 0) {
-    row("", fmt::format("{} {} split, {} sub-steps in all: a smaller --dt keeps energy better", counted(figures.run.split_steps, "step"),
-                        plural(figures.run.split_steps, "was", "were"), grouped(figures.run.substeps)));
-  }
+  if (figures.run.split_steps > 0) row("", describe(figures.run));
   if (figures.run.floor_steps > 0) {
     row("", fmt::format("{} stopped above the tolerance, where rounding lets the residual fall no further (largest {:.1e})",
                         counted(figures.run.floor_steps, "step"), figures.run.largest_residual));
@@ -196,6 +191,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"factorisations_mean", if_any(ran, mean(figures.run.factorisations, figures.run.steps))},
       {"substeps", figures.run.substeps},
       {"split_steps", figures.run.split_steps},
+      {"splits_in_a_row", figures.run.splits_in_a_row},
       {"rounding_floor_steps", figures.run.floor_steps},
       {"residual_max", figures.run.largest_residual},
       {"moves", is_motion(model, energy.scale())},

@@ -2,6 +2,7 @@
 // The account of a scene's effects.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "layout/field.hpp"
@@ -37,8 +38,9 @@ struct EffectWork {
 #undef LINDEN_MAGNITUDE
     return sum;
   }
-  double given() const { return servo + torque + motion + wrench; }
-  double taken() const { return damping + friction + limits + drag + ground; }
+  /// A servo, or what drives a given motion, that on the whole took energy is among what takes.
+  double given() const { return std::max(servo, 0.0) + std::max(motion, 0.0) + torque + wrench; }
+  double taken() const { return damping + friction + limits + drag + ground + std::max(-servo, 0.0) + std::max(-motion, 0.0); }
 };
 
 /// Where an effect took least in a step: below zero it gave there.

@@ -760,4 +760,16 @@ TEST_CASE("conservative effects leave no slope in the energy over 100,000 steps,
   CHECK(balance(damped) == Approx(before).margin(1e-4 * damped.effect_work().damping));
 }
 
+TEST_CASE("what the damping of servos takes is taken, not given", "[effects]") {
+  Effects effects;
+  effects.servos = {{.row = 0, .stiffness = 0, .damping = 0.01}};
+  Simulation simulation(chain(1), {.gravity = {0, 0, 0}}, effects);
+  simulation.set_velocities(std::vector<double>{1});
+  const double before = simulation.energy().kinetic;
+  run(simulation, 300);
+  CHECK(simulation.effect_work().given() == 0);
+  CHECK(simulation.effect_work().taken() == Approx(before - simulation.energy().kinetic).epsilon(1e-3));
+  CHECK(simulation.effect_work().taken() > 0.1 * before);
+}
+
 }  // namespace linden

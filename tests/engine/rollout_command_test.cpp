@@ -95,6 +95,27 @@ TEST_CASE("an interrupted rollout says so, exits with 130 and leaves a valid fil
   CHECK(shell.files() == std::set<std::string>{"a.h5", "a.json"});
 }
 
+TEST_CASE("a rollout with ground ends with a verdict", "[command line]") {
+  const Shell shell;
+  shell.write("box.urdf",
+              "<robot name=\"box\"><link name=\"box\"><inertial><mass value=\"3\"/>"
+              "<inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>"
+              "<collision><geometry><box size=\"0.2 0.2 0.2\"/></geometry></collision></link></robot>\n");
+  shell.write("falling.yaml",
+              "model: box.urdf\nbase: floating\nduration: 0.5\ninitial: {base: {position: [0, 0, 0.2]}}\n"
+              "effects: {gravity: [0, 0, -9.81], ground: {stiffness: 1e4, damping: 100}}\n");
+  const Outcome outcome = shell.linden("rollout falling.yaml --instances 20 --spread 0.01 --json a.json");
+  CHECK(outcome.exit_code == 0);
+  CHECK(outcome.err.empty());
+  CHECK_THAT(outcome.out, Contains("energy      of instance 0 on its own, over 0.5 s: effects took "));
+  CHECK_THAT(outcome.out, Contains("verdict     0 of 20 instances frozen, ") && Contains(" of 10,000 steps taken alone, the energy of that instance is accounted for"));
+  const nlohmann::json account = json_of(shell / "a.json")["account"];
+  CHECK(account["steps"] == 500);
+  // it falls by 0.1 m at most and stays: what it had is what was taken
+  CHECK(account["energy_taken"].get<double>() == Approx(3 * 9.81 * 0.1).epsilon(0.2));
+  CHECK(account["energy_band"].get<double>() < 0.05 * account["energy_taken"].get<double>());
+}
+
 TEST_CASE("single precision and mimic joints say what they cost", "[command line]") {
   const Shell shell;
   const Outcome single = shell.linden("rollout chain:4 --instances 20 --duration 0.01 --float");

@@ -139,5 +139,26 @@ TEST_CASE("what several runs took adds up, and a step that failed is not counted
   CHECK(first.largest_residual == 1e-11);
 }
 
+TEST_CASE("splits in a row are counted across runs, however they are cut") {
+  // s: split, p: not
+  const std::string steps = "sspsssppsp";
+  for (std::size_t cut = 0; cut <= steps.size(); ++cut) {
+    StepsReport first, second;
+    for (std::size_t k = 0; k < steps.size(); ++k) (k < cut ? first : second).add(StepReport{.substeps = steps[k] == 's' ? 2 : 1});
+    StepsReport both;
+    both.add(first);
+    both.add(second);
+    INFO("cut at " << cut);
+    CHECK(both.splits_in_a_row == 3);
+    CHECK(both.first_splits == 2);
+    CHECK(both.last_splits == 0);
+    CHECK(describe(both) == "6 of 10 steps were split, 3 of them in a row, 16 sub-steps in all: a smaller step keeps energy better");
+  }
+  StepsReport one;
+  CHECK(describe(one).empty());
+  one.add(StepReport{.substeps = 4});
+  CHECK(describe(one) == "1 of 1 steps was split, 4 sub-steps in all: a smaller step keeps energy better");
+}
+
 }  // namespace
 }  // namespace linden

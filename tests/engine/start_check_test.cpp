@@ -77,6 +77,16 @@ TEST_CASE("a joint that starts outside its limits is told with its value, its li
   CHECK(findings(arm_at({})).sound());
 }
 
+TEST_CASE("the position that is advised is the limit to the last digit, and is a start", "[start]") {
+  Scene scene = arm_at({0.2, 2, -0.3});
+  const double limit = 1.5707963267948966;
+  scene.effects.limits = {{1, -1, limit}};
+  CHECK_THAT(findings(scene).text(), Contains("{lower_joint: 1.5707963267948966}"));
+  scene.initial.positions[1] = limit;
+  CHECK(findings(scene).sound());
+  CHECK(findings(scene).moved.empty());
+}
+
 TEST_CASE("all that is wrong with a start stands in one message", "[start]") {
   const StartFindings found = findings(arm_at({0.7, -1.5, -1.3}));
   CHECK(found.faults.size() == 2);

@@ -57,6 +57,7 @@ class Traced {
       const int from = ::open("/dev/null", O_RDONLY), to = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600),
                 errors = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
       ::dup2(from, 0), ::dup2(to, 1), ::dup2(errors, 2);
+      for (const int number : {SIGINT, SIGTERM, SIGHUP}) ::signal(number, SIG_DFL);  // a test run by nohup ignores the last
       if (::chdir(place.c_str()) != 0 || ::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) ::_exit(126);
       ::execv(LINDEN_PROGRAM, pointers.data());
       ::_exit(127);

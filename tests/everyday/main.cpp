@@ -32,7 +32,7 @@ Asked asked(int argc, char** argv, bool& help) {
   CLI::App program("Tries random everyday scenes against a plain simulator and against what must hold for any of them.", "linden_everyday");
   Asked result;
   std::string only;
-  program.add_option("--scenes", result.scenes, "How many (2000); 20,000 take some ten minutes on two cores");
+  program.add_option("--scenes", result.scenes, "How many (2000); 20,000 take ten to twenty minutes on two cores");
   program.add_option("--seed", result.seed, "All scenes follow from it (1)");
   program.add_option("--first", result.first, "Number of the first scene (1)");
   program.add_option("--threads", result.threads, "0: all that the machine has (0)");
