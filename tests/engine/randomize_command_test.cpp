@@ -102,6 +102,20 @@ TEST_CASE("the command line goes over what a scene randomises, and a model alone
   CHECK(read(shell.file("a.npz")).count("gain_factors") == 0);
 }
 
+TEST_CASE("the account of energy that a rollout gives is of the instance as it was drawn", "[command line][randomization]") {
+  const Shell shell;
+  shell.write("ball.urdf",
+              "<robot name='ball'><link name='ball'><inertial><mass value='2'/>"
+              "<inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial></link></robot>");
+  shell.write("fall.yaml",
+              "model: ball.urdf\nbase: floating\nduration: 0.5\neffects: {gravity: [0, 0, -9.81], drag: {linear: 1e-9}}\n"
+              "randomize: {masses: [0.2, 5]}\n");
+  REQUIRE(shell.linden("rollout fall.yaml --instances 3 --spread 0 --seed 12 --json a.json --record a.npz").exit_code == 0);
+  const double factor = doubles_of(read(shell.file("a.npz")).at("mass_factors"))[0], speed = 9.81 * 0.5;
+  CHECK(std::abs(factor - 1) > 0.1);
+  CHECK(json_of(shell / "a.json")["account"]["energy_scale"] == Approx(0.5 * factor * 2 * speed * speed).epsilon(1e-6));
+}
+
 TEST_CASE("a run is the instance that its seed draws, says so and records it", "[command line][randomization]") {
   const Shell shell;
   shell.write("drawn.yaml", kScene + kRandomize);
