@@ -113,7 +113,7 @@ class SceneReader {
     constexpr const char* kRange = "a number, or a pair [low, high]";
     for (const auto& [key, value] : at.entries_of(randomized_names())) {
       const std::vector<double> numbers = value.is(Kind::list) ? value.numbers(2, kRange) : std::vector{value.number(kRange)};
-      value.located([&] { set_range(scene_.randomization, key, numbers, scene_.effects); });
+      value.located([&, &name = key] { set_range(scene_.randomization, name, numbers, scene_.effects); });
     }
   }
 
