@@ -171,7 +171,7 @@ TEST_CASE("a checkpoint is loaded from ordinary files alone, and nothing is wait
   check_refused(shell, "run chain:3 --load nothing", "nothing: the checkpoint cannot be read; does the file exist?");
 }
 
-#ifndef __SANITIZE_ADDRESS__  // which takes more memory than there is
+#ifndef LINDEN_SANITIZED  // AddressSanitizer takes more memory than there is
 TEST_CASE("memory and threads that cannot be had are said in one line", "[command line]") {
   const Shell shell;
   const Outcome memory = shell.linden("run chain:500000 --duration 0.01 --json a.json", "ulimit -v 400000; ");
