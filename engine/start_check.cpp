@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 #include <unordered_map>
 
 #include "engine/scene/scene.hpp"
@@ -56,9 +57,12 @@ double depth_below(const GroundPlan& plan, const GroundPoint& point, const Field
 
 std::string StartFindings::text() const {
   if (faults.empty()) return "";
-  return fmt::format("it starts where it cannot stay: {}; {}, or write start: as given (on the command line --start as-given) to begin there "
+  constexpr std::size_t kMost = 6;  // whoever reads on has understood; what to write has them all
+  const std::span<const std::string> shown = std::span(faults).first(std::min(kMost, faults.size()));
+  const std::string more = faults.size() > kMost ? fmt::format("; and {} more", faults.size() - kMost) : "";
+  return fmt::format("it starts where it cannot stay: {}{}; {}, or write start: as given (on the command line --start as-given) to begin there "
                      "all the same",
-                     fmt::join(faults, "; "), fmt::join(advice, "; "));
+                     fmt::join(shown, "; "), more, fmt::join(advice, "; "));
 }
 
 StartCheck::StartCheck(const Model& model, const Options& options, const Effects& effects)
