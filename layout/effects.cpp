@@ -179,6 +179,11 @@ class Checker {
       const auto twice = std::ranges::adjacent_find(entry.position.times);
       if (twice != entry.position.times.end())
         fail(fmt::format("{} is at two places at {} s", row_text(model_, entry.row), *twice), "one position a time", "leave one out");
+      if (!entry.velocities.empty() && entry.velocities.size() != entry.position.times.size()) {
+        fail(fmt::format("position has {} times, and there are {} velocities", entry.position.times.size(), entry.velocities.size()),
+             "one a time, or none", "add what is missing");
+      }
+      for (const double velocity : entry.velocities) finite("a velocity", velocity);
     });
     refuse_moved("friction", effects_.friction);
     refuse_moved("limits", effects_.limits);

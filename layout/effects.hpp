@@ -97,7 +97,8 @@ struct JointTorque {
 /// neither friction nor limits of its own.
 struct JointMotion {
   Index row;
-  Course position;  // [rad, m]; no two times are equal
+  Course position;                  // [rad, m]; no two times are equal
+  std::vector<double> velocities{};  // at those points [rad/s, m/s]; none: the curve's own, which never overshoots
 };
 
 /// A wrench on a body.

@@ -27,7 +27,7 @@ class Destination {
   const std::string& file() const { return file_; }
   /// With links followed.
   const std::filesystem::path& place() const { return place_; }
-  /// A hidden name beside it that nobody else has: .NAME.linden.XXXXXXXX.part
+  /// A hidden name beside it that nobody else has: .NAME.linden.LETTERS.part
   std::string temporary() const;
   /// Whether a file of that name in its folder is such a one.
   bool is_temporary(std::string_view name) const;

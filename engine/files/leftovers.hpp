@@ -1,7 +1,7 @@
 // engine/files/leftovers.hpp
 // What a process left behind that was killed while it wrote.
 //
-// An output is written under a hidden name beside it, .NAME.linden.XXXXXXXX.part, a file or a folder, which is locked (flock) as long as the
+// An output is written under a hidden name beside it, .NAME.linden.LETTERS.part, a file or a folder, which is locked (flock) as long as the
 // process lives: the system gives the lock back when it dies, however it dies. What bears such a name and can be locked is nobody's. On file
 // systems that know no locks nothing is held and nothing is removed.
 #pragma once

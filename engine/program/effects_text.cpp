@@ -194,7 +194,7 @@ Json effects_json(const Effects& effects, const Model& model) {
     return Json{{"joint", joint(e.row)}, {"force", course(e.force)}};
   });
   list("motion", effects.motions, [&](const JointMotion& e) {
-    return Json{{"joint", joint(e.row)}, {"position", course(e.position)}};
+    return Json{{"joint", joint(e.row)}, {"position", course(e.position)}, {"velocities", e.velocities}};
   });
   list("wrench", effects.wrenches, [&](const BodyWrench& e) {
     return Json{{"body", body(e.slot)},

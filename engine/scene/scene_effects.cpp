@@ -9,7 +9,11 @@
 #include <utility>
 
 #include "engine/scene/number_table.hpp"
+#include "engine/scene/scene_course.hpp"
+#include "engine/scene/scene_joints.hpp"
+#include "engine/scene/scene_servos.hpp"
 #include "engine/text.hpp"
+#include "layout/smooth_curve.hpp"
 #include "layout/words.hpp"
 
 namespace linden {
@@ -23,9 +27,6 @@ const std::vector<std::string> kEffects{"gravity", "armature", "damping", "frict
                                         "servo",   "torque",   "motion",  "wrench",   "drag",   "ground"};
 const std::vector<std::string> kSpring{"stiffness", "rest"};
 const std::vector<std::string> kLimit{"lower", "upper", "restitution", "velocity"};
-const std::vector<std::string> kServo{"stiffness", "damping", "max_force", "targets", "velocities", "feedforward", "joints"};
-const std::vector<std::string> kServoJoint{"stiffness", "damping", "target", "target_velocity", "feedforward", "max_force"};
-const std::vector<std::string> kCourse{"times", "values"};
 const std::vector<std::string> kWrench{"force", "moment", "point", "frame", "from", "to", "file"};
 const std::vector<std::string> kFrames{"world", "body"};
 const std::vector<std::string> kDrag{"linear", "quadratic", "wind", "bodies"};
@@ -33,34 +34,19 @@ const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
+/// By which a curve may round beyond a limit that one of its points lies on [rad, m].
+constexpr double kRounding = 1e-9;
+
 constexpr std::string_view kVelocityLimit = "urdf or a number";
 constexpr std::string_view kUrdfOrNumber = "urdf, a number or {joint: number}";
 
 std::array<double, 3> array_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// A joint of the model that a scene names.
-struct NamedJoint {
-  Index slot, row, position;
-  JointKind kind;
-};
-
 class Reader {
  public:
   Reader(const Model& model, const std::vector<double>& start, std::string folder)
-      : model_(model),
-        start_(start),
-        folder_(std::move(folder)),
-        slot_of_row_(static_cast<std::size_t>(model.tree.shape.velocities)) {
-    for (const Run& run : model.tree.runs) {
-      for (Index i = run.begin; i < run.end; ++i) {
-        for (Index k = 0; k < velocity_count(run.kind); ++k) {
-          slot_of_row_[static_cast<std::size_t>(model.tree.first_v(i) + k)] = {i, run.kind};
-        }
-      }
-    }
-    for (const Mimic& mimic : model.mimics) leader_of_[mimic.follower_slot] = mimic.leader_slot;
-  }
+      : model_(model), start_(start), folder_(std::move(folder)), joints_(model) {}
 
   std::vector<JointLimit> read_limits(const SceneValue& at) {
     if (const auto value = at.find("limits")) limits(*value);
@@ -77,7 +63,7 @@ class Reader {
       if (key == "friction") friction(value);
       if (key == "spring") spring(value);
       if (key == "limits") limits(value);
-      if (key == "servo") servo(value);
+      if (key == "servo") result_.effects.servos = read_servos(value, joints_, start_, folder_, result_.warnings);
       if (key == "torque") torque(value);
       if (key == "motion") motion(value);
       if (key == "wrench") wrench(value);
@@ -93,41 +79,7 @@ class Reader {
   }
 
  private:
-  const std::string& joint_name(Index slot) const { return model_.names.joint[static_cast<std::size_t>(slot)]; }
   void warn(std::string message) { result_.warnings.push_back(std::move(message)); }
-
-  NamedJoint joint(const Entry& entry) const { return joint(entry.value, entry.key); }
-  NamedJoint joint(const SceneValue& at, const std::string& name) const {
-    const Index row = at.located([&] { return row_of(model_, name); });
-    const auto [slot, kind] = slot_of_row_[static_cast<std::size_t>(row)];
-    if (kind == JointKind::free)
-      at.fail(fmt::format("joint {} is a free joint", linden::quoted(name)), "a joint that turns or slides", "leave it out");
-    return {slot, row, model_.tree.first_q(slot), kind};
-  }
-  NamedJoint screw(const SceneValue& at, const std::string& name) const {
-    const NamedJoint found = joint(at, name);
-    if (found.kind != JointKind::screw) {
-      at.fail(fmt::format("joint {} is a ball joint", linden::quoted(name)), "a joint that turns or slides about one axis",
-              "leave it out; ball joints have damping and spring");
-    }
-    return found;
-  }
-  NamedJoint screw(const Entry& entry) const { return screw(entry.value, entry.key); }
-  void refuse_follower(const SceneValue& at, const NamedJoint& joint) const {
-    const auto found = leader_of_.find(joint.slot);
-    if (found == leader_of_.end()) return;
-    at.fail(fmt::format("joint {} follows another", linden::quoted(joint_name(joint.slot))), "a joint that follows none",
-            fmt::format("name its leader {}", linden::quoted(joint_name(found->second))));
-  }
-
-  LinkPlace body(const SceneValue& at, const std::string& link) const {
-    const LinkPlace place = at.located([&] { return place_of(model_, link); });
-    if (place.slot == 0)
-      at.fail(fmt::format("link {} is fixed to the world", linden::quoted(link)), "a link that moves", "leave it out");
-    return place;
-  }
-
-  std::string file_of(const SceneValue& at) const { return (std::filesystem::path(folder_) / at.text("a CSV file")).string(); }
 
   static double restitution_of(const SceneValue& at) {
     const double value = at.number();
@@ -143,7 +95,7 @@ class Reader {
       list = armature_everywhere(model_, at.not_negative("a number or {joint: number}"));
     } else {
       for (const Entry& entry : at.entries("a number or {joint: number}"))
-        list.push_back({screw(entry).row, entry.value.not_negative()});
+        list.push_back({joints_.screw(entry).row, entry.value.not_negative()});
       list = on_leaders(model_, list);
     }
     if (list.empty()) warn("no joint has any");
@@ -157,7 +109,7 @@ class Reader {
       list = damping_everywhere(model_, at.not_negative(kUrdfOrNumber));
     } else {
       for (const Entry& entry : at.entries(kUrdfOrNumber)) {
-        const NamedJoint found = joint(entry);
+        const NamedJoint found = joints_.joint(entry);
         const double coefficient = entry.value.not_negative();
         for (Index k = 0; k < velocity_count(found.kind); ++k) list.push_back({found.row + k, coefficient});
       }
@@ -173,7 +125,7 @@ class Reader {
     } else if (at.is(Kind::text)) {
       list = friction_everywhere(model_, at.not_negative(kUrdfOrNumber));
     } else {
-      for (const Entry& entry : at.entries(kUrdfOrNumber)) list.push_back({screw(entry).row, entry.value.not_negative()});
+      for (const Entry& entry : at.entries(kUrdfOrNumber)) list.push_back({joints_.screw(entry).row, entry.value.not_negative()});
       list = on_leaders(model_, list);
     }
     if (list.empty()) warn("no joint has any");
@@ -181,8 +133,8 @@ class Reader {
 
   void spring(const SceneValue& at) {
     for (const Entry& entry : at.entries("{joint: {stiffness, rest}}")) {
-      const NamedJoint found = joint(entry);
-      refuse_follower(entry.value, found);
+      const NamedJoint found = joints_.joint(entry);
+      joints_.refuse_follower(entry.value, found);
       entry.value.entries_of(kSpring);
       const auto stiffness = entry.value.find("stiffness"), rest = entry.value.find("rest");
       if (!stiffness)
@@ -244,7 +196,7 @@ class Reader {
 
   JointLimit limit(const Entry& entry, const SharedLimits& shared) const {
     const SceneValue& at = entry.value;
-    const Index row = screw(entry).row;
+    const Index row = joints_.screw(entry).row;
     JointLimit result{row, model_.attributes.lower(row), model_.attributes.upper(row), shared.restitution};
     result.velocity = shared.velocity_of_file ? model_.attributes.max_velocity(row) : shared.velocity;
     if (!at.says("urdf")) {
@@ -269,128 +221,20 @@ class Reader {
     return result;
   }
 
-  /// Effort limit that `at` says, or else the model's file.
-  double max_force(const std::optional<SceneValue>& at, Index row) const {
-    if (!at || at->says("urdf")) return model_.attributes.max_effort(row);
-    if (at->says("none")) return std::numeric_limits<double>::infinity();
-    return at->not_negative("urdf, none or a number");
-  }
-
-  void servo(const SceneValue& at) {
-    at.entries_of(kServo);
-    const auto stiffness = at.find("stiffness"), damping = at.find("damping"), force = at.find("max_force"),
-               joints = at.find("joints");
-    const double shared_damping = damping ? damping->not_negative() : 0;
-    std::map<Index, Servo> servos;
-    const auto add = [&](const SceneValue& place, const NamedJoint& joint) {
-      refuse_follower(place, joint);
-      Servo servo{.row = joint.row, .stiffness = stiffness ? stiffness->not_negative() : 0, .damping = shared_damping};
-      servo.target = start_[static_cast<std::size_t>(joint.position)];
-      servo.max_force = max_force(force, joint.row);
-      servos.emplace(joint.row, servo);
-    };
-    const auto require_stiffness = [&](const SceneValue& place) {
-      if (!stiffness)
-        place.fail(place.path() + " has no stiffness", "one for all its joints, or one a joint", "add stiffness: number");
-    };
-    if (!joints || (joints->is(Kind::map) && stiffness)) {
-      require_stiffness(at);
-      for (const Servo& servo : servo_everywhere(model_, stiffness->not_negative(), shared_damping, start_)) {
-        servos.emplace(servo.row, servo).first->second.max_force = max_force(force, servo.row);
-      }
-    } else if (joints->is(Kind::list)) {
-      require_stiffness(at);
-      for (const SceneValue& item : joints->list("joints")) {
-        const NamedJoint named = screw(item, item.text("the name of a joint"));
-        if (servos.count(named.row) > 0) item.refuse("every joint once", "leave one out");
-        add(item, named);
-      }
-    }
-    if (joints && !joints->is(Kind::list)) {
-      constexpr std::string_view kExpected =
-          "[joint, ...] or {joint: {stiffness, damping, target, target_velocity, feedforward, max_force}}";
-      for (const Entry& entry : joints->entries(kExpected)) {
-        entry.value.entries_of(kServoJoint);
-        const NamedJoint named = screw(entry);
-        if (!entry.value.find("stiffness")) require_stiffness(entry.value);
-        add(entry.value, named);
-        own_values(entry.value, servos.at(named.row));
-      }
-    }
-    const auto over_joints = [&](const char* key, const char* own_key, const auto& put) {
-      const auto map = at.find(key);
-      if (!map) return;
-      for (const Entry& entry : map->entries("{joint: number, FILE.csv or {times, values}}")) {
-        const NamedJoint named = screw(entry);
-        refuse_follower(entry.value, named);
-        const auto found = servos.find(named.row);
-        if (found == servos.end())
-          entry.value.fail(fmt::format("joint {} has no servo", linden::quoted(entry.key)), "a joint that has one",
-                           "add it to joints");
-        if (joints && joints->is(Kind::map)) {
-          if (const auto own = joints->find(entry.key); own && own->find(own_key))
-            entry.value.refuse(fmt::format("one {} a joint", own_key), "leave one out");
-        }
-        put(found->second, course(entry.value));
-      }
-    };
-    over_joints("targets", "target", set_target);
-    over_joints("velocities", "target_velocity", [](Servo& servo, Course course) { servo.target_velocity = std::move(course); });
-    over_joints("feedforward", "feedforward", [](Servo& servo, Course course) { servo.feedforward = std::move(course); });
-    std::vector<std::string> dead;
-    for (const auto& [row, servo] : servos) {
-      if (servo.stiffness == 0 && servo.damping == 0 && is_zero(servo.feedforward)) continue;
-      if (servo.max_force == 0) dead.push_back(model_.names.velocity[static_cast<std::size_t>(row)]);
-      result_.effects.servos.push_back(servo);
-    }
-    if (result_.effects.servos.empty()) warn("no joint has any");
-    if (!dead.empty()) {
-      warn(fmt::format("{} of {} servos have no strength ({}): their effort limit is 0; max_force gives another", dead.size(),
-                       result_.effects.servos.size(), linden::quoted(dead.front())));
-    }
-  }
-
-  static bool is_zero(const Course& course) {
-    return std::ranges::all_of(course.values, [](double value) { return value == 0; });
-  }
-
-  /// A table, or where it is one value, that.
-  static void set_target(Servo& servo, Course course) {
-    if (course.values.size() == 1) {
-      servo.target = course.values.front();
-    } else {
-      servo.target_over_time = std::move(course);
-    }
-  }
-
-  void own_values(const SceneValue& at, Servo& servo) const {
-    if (const auto value = at.find("stiffness")) servo.stiffness = value->not_negative();
-    if (const auto value = at.find("damping")) servo.damping = value->not_negative();
-    if (const auto value = at.find("target")) set_target(servo, course(*value));
-    if (const auto value = at.find("target_velocity")) servo.target_velocity = course(*value);
-    if (const auto value = at.find("feedforward")) servo.feedforward = course(*value);
-    if (const auto value = at.find("max_force")) servo.max_force = max_force(value, servo.row);
-  }
-
   void torque(const SceneValue& at) {
     for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values}}")) {
-      const NamedJoint named = screw(entry);
-      refuse_follower(entry.value, named);
-      result_.effects.torques.push_back({named.row, course(entry.value)});
+      const NamedJoint named = joints_.screw(entry);
+      joints_.refuse_follower(entry.value, named);
+      result_.effects.torques.push_back({named.row, read_course(entry.value, folder_)});
     }
     if (result_.effects.torques.empty()) warn("no joint has any");
   }
 
   void motion(const SceneValue& at) {
-    for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values}}")) {
-      const NamedJoint named = screw(entry);
-      refuse_follower(entry.value, named);
-      const Course positions = course(entry.value);
-      const auto twice = std::ranges::adjacent_find(positions.times);
-      if (twice != positions.times.end())
-        entry.value.fail(fmt::format("{} is at two places at {} s", entry.value.path(), *twice), "one position a time",
-                         "leave one out; a servo can have a target that jumps");
-      result_.effects.motions.push_back({named.row, positions});
+    for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values, velocities}}")) {
+      const NamedJoint named = joints_.screw(entry);
+      joints_.refuse_follower(entry.value, named);
+      result_.effects.motions.push_back(read_motion(entry.value, named.row, folder_));
     }
     if (result_.effects.motions.empty()) warn("no joint has any");
   }
@@ -403,13 +247,12 @@ class Reader {
     for (const JointLimit& limit : result_.effects.limits) {
       const auto found = std::ranges::find(result_.effects.motions, limit.row, &JointMotion::row);
       if (found == result_.effects.motions.end()) continue;
-      for (std::size_t k = 0; k < found->position.values.size(); ++k) {
-        const double value = found->position.values[k];
-        if (value >= limit.lower && value <= limit.upper) continue;
-        at.find("motion")->fail(fmt::format("effects.motion leads {} to {} at {} s, beyond its limits of {} to {}",
-                            linden::quoted(model_.names.velocity[static_cast<std::size_t>(limit.row)]), value, found->position.times[k],
-                            limit.lower, limit.upper),
-                "positions within them", "change the table, or leave the joint out of limits");
+      for (const auto& [time, value] : SmoothCurve(found->position, found->velocities).extremes()) {
+        if (value >= limit.lower - kRounding && value <= limit.upper + kRounding) continue;
+        at.find("motion")->fail(fmt::format("effects.motion leads {} to {:.6g} at {:.6g} s, beyond its limits of {} to {}",
+                                            linden::quoted(model_.names.velocity[static_cast<std::size_t>(limit.row)]), value, time, limit.lower,
+                                            limit.upper),
+                                "positions within them", "change the table, or leave the joint out of limits");
       }
     }
     std::erase_if(result_.effects.limits, moved);
@@ -419,51 +262,9 @@ class Reader {
     }
   }
 
-  Course course(const SceneValue& at) const {
-    if (at.is(Kind::text)) {
-      const std::string& word = at.text("a number or FILE.csv");
-      const std::optional<double> value = number_in(word);
-      if (value) return {{0}, {at.number()}};
-      if (!word.ends_with(".csv")) at.refuse("a number, FILE.csv or {times, values}", "write for example 0.5");
-      return course_of_file(at);
-    }
-    at.entries_of(kCourse);
-    const auto times = at.find("times"), values = at.find("values");
-    if (!times || !values)
-      at.fail(fmt::format("{} has no {}", at.path(), times ? "values" : "times"), "times and values", "add a list");
-    Course result{times->numbers(), values->numbers()};
-    if (result.times.empty() || result.times.size() != result.values.size()) {
-      values->fail(fmt::format("{} has {} times and {} values", at.path(), result.times.size(), result.values.size()),
-                   "one value a time, one or more", "add what is missing");
-    }
-    for (std::size_t k = 1; k < result.times.size(); ++k) {
-      if (result.times[k] < result.times[k - 1]) {
-        times->fail(fmt::format("time {} s comes after {} s", result.times[k], result.times[k - 1]), "times that ascend",
-                    "sort them");
-      }
-    }
-    return result;
-  }
-
-  Course course_of_file(const SceneValue& at) const {
-    const std::string file = file_of(at);
-    const NumberTable table = at.located([&] { return read_numbers(file, 2); });
-    Course result{{}, {}};
-    for (std::size_t k = 0; k < table.rows.size(); ++k) {
-      const double time = table.rows[k][0];
-      if (k > 0 && time < result.times.back()) {
-        at.fail(fmt::format("{}:{}: time {} s comes after {} s", file, table.lines[k], time, result.times.back()),
-                "times that ascend", "sort its lines");
-      }
-      result.times.push_back(time);
-      result.values.push_back(table.rows[k][1]);
-    }
-    return result;
-  }
-
   void wrench(const SceneValue& at) {
     for (const Entry& entry : at.entries("{link: {force, moment, point, frame, from, to, file}}")) {
-      const LinkPlace place = body(entry.value, entry.key);
+      const LinkPlace place = joints_.body(entry.value, entry.key);
       if (!entry.value.is(Kind::list)) {
         result_.effects.wrenches.push_back(wrench_on(place, entry.value));
         continue;
@@ -492,7 +293,7 @@ class Reader {
     if (const auto value = at.find("to")) result.to = value->number();
     if (result.from > result.to)
       at.fail(fmt::format("{} goes from {} to {} s", at.path(), result.from, result.to), "from at or before to", "exchange them");
-    if (const auto file = at.find("file")) result.scale = course_of_file(*file);
+    if (const auto file = at.find("file")) result.scale = read_course_file(*file, folder_);
     return result;
   }
 
@@ -513,7 +314,7 @@ class Reader {
     if (const auto bodies = at.find("bodies")) {
       std::map<Index, std::string> named;
       for (const Entry& entry : bodies->entries("{link: {linear, quadratic}}")) {
-        const Index slot = body(entry.value, entry.key).slot;
+        const Index slot = joints_.body(entry.value, entry.key).slot;
         entry.value.entries_of(kBodyDrag);
         if (!has_mass(slot))
           entry.value.fail(fmt::format("the body of link {} has no mass", linden::quoted(entry.key)), "one that drag can act on",
@@ -567,7 +368,7 @@ class Reader {
       spacing->fail(fmt::format("{} holds {} and {}", spacing->path(), apart[0], apart[1]), "two numbers above zero",
                     "change them");
     const std::vector<double> begin = origin ? origin->numbers(2, "[x, y] in m") : std::vector<double>{0, 0};
-    const std::string path = file_of(*file);
+    const std::string path = scene_path(*file, folder_);
     const NumberTable table = file->located([&] { return read_numbers(path, 0, 2); });
     if (table.rows.size() < 2) file->fail(fmt::format("{} has one row", path), "two or more, each along x", "add heights");
     HeightField field{.columns = static_cast<Index>(table.rows.front().size()),
@@ -584,8 +385,7 @@ class Reader {
   const Model& model_;
   const std::vector<double>& start_;
   std::string folder_;
-  std::vector<std::pair<Index, JointKind>> slot_of_row_;
-  std::map<Index, Index> leader_of_;
+  SceneJoints joints_;
   SceneEffects result_;
 };
 

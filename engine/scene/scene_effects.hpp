@@ -20,7 +20,8 @@
 // are none but those that are named: `limits: urdf` means positions.
 // Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo, torque and motion refuse it.
 // Free joints have none of these, ball joints damping and spring only. A link that is merged into another's body acts there.
-// CSV files are found relative to the scene: time,value a line for torque, servo, motion and wrench (there a share of force and moment).
+// CSV files are found relative to the scene: time,value a line for torque, servo, motion
+// (also time,position,velocity) and wrench (there a share of force and moment).
 #pragma once
 
 #include <array>

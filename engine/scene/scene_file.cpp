@@ -80,7 +80,7 @@ class SceneReader {
   void begin_motions() {
     const Tree& tree = scene_.model.tree;
     for (const JointMotion& motion : scene_.effects.motions) {
-      const SmoothCurve curve(motion.position);
+      const SmoothCurve curve(motion.position, motion.velocities);
       for (Index i = 1; i < tree.shape.slots; ++i) {
         if (tree.first_v(i) != motion.row) continue;
         scene_.initial.positions[static_cast<std::size_t>(tree.first_q(i))] = curve.at(0);

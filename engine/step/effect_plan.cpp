@@ -144,7 +144,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
   bodies = !effects.drag.empty() || !effects.wrenches.empty() || !points.empty();
   joints = !effects.armature.empty() || !effects.springs.empty() || !effects.ball_springs.empty() || !effects.damping.empty() ||
            !effects.friction.empty() || !effects.limits.empty() || !effects.servos.empty() || !effects.torques.empty() || !effects.motions.empty();
-  for (const JointMotion& motion : effects.motions) curves.emplace_back(motion.position);
+  for (const JointMotion& motion : effects.motions) curves.emplace_back(motion.position, motion.velocities);
   springs = !effects.springs.empty() || !effects.ball_springs.empty() || !points.empty();
   balls = !effects.ball_springs.empty() || std::ranges::any_of(effects.damping, [&](const JointDamping& damper) {
     return std::ranges::none_of(tree.runs, [&](const Run& run) {

@@ -17,6 +17,7 @@
 
 #include "engine/step/effect_plan.hpp"
 #include "engine/step/effect_work.hpp"
+#include "engine/step/lane_times.hpp"
 #include "kernels/articulated.hpp"
 #include "kernels/effects/armature.hpp"
 #include "kernels/effects/ball_spring.hpp"
@@ -45,46 +46,6 @@ inline constexpr double kMostBend = 1.5;
 
 /// Where within a step the velocity of a given motion is that with which it comes to the end: but for the rounding of times, there.
 inline constexpr double kComing = 1 - 1e-6;
-
-/// Numbers in a Scalar.
-template <class S>
-inline constexpr std::size_t kLanesOf = sizeof(S) / sizeof(typename ElementOf<S>::type);
-
-/// When a step begins, in each lane [s]: in double precision whatever that of the lanes is, or tables would be looked up beside it.
-template <class S>
-using LaneTimes = std::array<double, kLanesOf<S>>;
-
-/// f of each lane's time.
-template <class S, class Function>
-LINDEN_INLINE S at_each_time(const LaneTimes<S>& times, const Function& f) {
-  if constexpr (std::is_arithmetic_v<S>) {
-    return static_cast<S>(f(times[0]));
-  } else {
-    using Real = typename ElementOf<S>::type;
-    std::array<Real, kLanesOf<S>> each;
-    for (std::size_t l = 0; l < each.size(); ++l) {
-      each[l] = l > 0 && times[l] == times[l - 1] ? each[l - 1] : static_cast<Real>(f(times[l]));
-    }
-    return S::load_unaligned(each.data());
-  }
-}
-
-/// The same of each lane's time and a number of its own.
-template <class S, class Function>
-LINDEN_INLINE S at_each_time(const LaneTimes<S>& times, const S& numbers, const Function& f) {
-  if constexpr (std::is_arithmetic_v<S>) {
-    return static_cast<S>(f(times[0], numbers));
-  } else {
-    using Real = typename ElementOf<S>::type;
-    std::array<Real, kLanesOf<S>> own, each;
-    numbers.store_unaligned(own.data());
-    for (std::size_t l = 0; l < each.size(); ++l) {
-      const bool again = l > 0 && times[l] == times[l - 1] && own[l] == own[l - 1];
-      each[l] = again ? each[l - 1] : static_cast<Real>(f(times[l], static_cast<double>(own[l])));
-    }
-    return S::load_unaligned(each.data());
-  }
-}
 
 /// How far a solve is when states are revised: its residual is small; it is solved; it has been revised so often that of what sticks too
 /// hard one alone begins to slide; and so often that of limits too one alone changes.

@@ -38,9 +38,17 @@ struct EffectWork {
 #undef LINDEN_MAGNITUDE
     return sum;
   }
-  /// A servo, or what drives a given motion, that on the whole took energy is among what takes.
-  double given() const { return std::max(servo, 0.0) + std::max(motion, 0.0) + torque + wrench; }
-  double taken() const { return damping + friction + limits + drag + ground + std::max(-servo, 0.0) + std::max(-motion, 0.0); }
+  /// What drives, and on the whole took energy, is among what takes.
+  double given() const { return driven(1); }
+  double taken() const { return damping + friction + limits + drag + ground + driven(-1); }
+
+ private:
+  /// Of what drives: all that gave (way 1), or took (way -1).
+  double driven(double way) const {
+    double sum = 0;
+    for (const double work : {servo, torque, motion, wrench}) sum += std::max(way * work, 0.0);
+    return sum;
+  }
 };
 
 /// Where an effect took least in a step: below zero it gave there.

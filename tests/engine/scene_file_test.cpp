@@ -355,6 +355,14 @@ TEST_CASE("motions are numbers, tables or files; their joints start there and ha
   }));
   check_message(kArm + "effects:\n  limits: urdf\n  motion: {joint_1: {times: [0, 2], values: [0, 7]}}\n", 4,
                 {"effects.motion leads \"joint_1\" to 7 at 2 s, beyond its limits"});
+  folder.write("fast.csv", "0,0,1\n1,1,1\n");
+  folder.write("fast.yaml", kArm + "effects:\n  motion: {joint_1: fast.csv, joint_2: {times: [0, 1], values: [0, 0], velocities: [4, -4]}}\n");
+  const Scene fast = load_scene(folder.file("fast.yaml"));
+  CHECK(fast.effects.motions[0].velocities == std::vector<double>{1, 1});
+  CHECK(fast.initial.velocities[1] == Approx(4));
+  check_message(kArm + "effects:\n  limits: urdf\n  motion: {joint_1: {times: [0, 1], values: [0, 0], velocities: [40, -40]}}\n", 4,
+                {"effects.motion leads \"joint_1\" to 10 at 0.5 s, beyond its limits"});
+  check_message(kArm + "effects:\n  motion: {joint_1: {times: [0, 1], values: [0, 7], velocities: [1]}}\n", 3, {"2 times and 1 velocities"});
   check_message(kArm + "effects:\n  motion: {joint_1: {times: [0, 0], values: [0, 7]}}\n", 3, {"at two places at 0 s"});
   check_message(kArm + "initial: {positions: {joint_1: 1}}\neffects: {motion: {joint_1: 0}}\n", 2, {"the motion of joint \"joint_1\" is given"});
 }

@@ -36,19 +36,23 @@ std::vector<double> column(const std::filesystem::path& file, const std::string&
   return values;
 }
 
-/// time,value of a sine from a spreadsheet, 50 points a second.
-std::string sine(double size, double rate, double duration) {
-  std::string text = "time [s],angle [rad]\n";
-  for (int k = 0; k <= static_cast<int>(50 * duration); ++k) text += fmt::format("{},{}\n", k / 50.0, size * std::sin(rate * k / 50.0));
+/// time,value of a sine from a spreadsheet, 50 points a second, with velocities or without.
+std::string sine(double size, double rate, double duration, bool velocities) {
+  std::string text = velocities ? "time [s],angle [rad],[rad/s]\n" : "time [s],angle [rad]\n";
+  for (int k = 0; k <= static_cast<int>(50 * duration); ++k) {
+    text += fmt::format("{},{}", k / 50.0, size * std::sin(rate * k / 50.0));
+    text += velocities ? fmt::format(",{}\n", size * rate * std::cos(rate * k / 50.0)) : "\n";
+  }
   return text;
 }
 
 TEST_CASE("an arm follows a sine: exactly where its motion is given, closely by a servo, and the forces are recorded", "[task]") {
   const Shell shell;
-  shell.write("sine.csv", sine(0.4, kTurn / 2, 2));
+  shell.write("sine.csv", sine(0.4, kTurn / 2, 2, false));
+  shell.write("smooth.csv", sine(0.4, kTurn / 2, 2, true));
   const std::string head = "model: " + model_file("arm.urdf") + "\nduration: 1.5\neffects:\n  gravity: [0, 0, -9.81]\n";
   shell.write("given.yaml", head + "  servo: {stiffness: 2000, damping: 100, joints: [joint_2, joint_3, joint_4, joint_5, joint_6, joint_7]}\n"
-                                   "  motion: {joint_1: sine.csv}\n");
+                                   "  motion: {joint_1: smooth.csv}\n");
   shell.write("servo.yaml", head + "  servo: {stiffness: 2000, damping: 100, targets: {joint_1: sine.csv}}\n");
   for (const std::string how : {"given", "servo"}) {
     const Outcome outcome = shell.linden("run " + how + ".yaml --what positions,forces --record " + how + ".csv --json " + how + ".json");

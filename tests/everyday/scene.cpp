@@ -245,17 +245,21 @@ class Maker {
     const auto [slot, row] = screws[random.below(screws.size())];
     double& q = scene_.start.positions[static_cast<std::size_t>(model().tree.first_q(slot))];
     double& v = scene_.start.velocities[static_cast<std::size_t>(row)];
-    Course course{{0}, {q}};
+    JointMotion motion{row, {{0}, {q}}};
+    Course& course = motion.position;
     const double kind = random.uniform(0, 1), apart = h_ * 2 * std::pow(10.0, random.uniform(0, 1));
     const double w = random.uniform(0.02, 0.3) / apart, size = random.uniform(0.2, 1) * std::min(slides(slot) ? 0.1 : 0.8, (slides(slot) ? 0.5 : 3.0) / w);
     const double phase = random.uniform(0, 2 * std::numbers::pi);
+    const bool with_velocities = kind > 0.2 && kind <= 0.4;
+    if (with_velocities) motion.velocities.push_back(size * w * std::cos(phase));
     for (int k = 1; kind > 0.2 && k < 400; ++k) {
       course.times.push_back(k * apart);
       const bool stands = kind > 0.6 && k / 25 % 2 == 0;
       course.values.push_back(stands ? course.values.back() : course.values.back() + size * (std::sin(w * k * apart + phase) - std::sin(w * (k - 1) * apart + phase)));
+      if (with_velocities) motion.velocities.push_back(size * w * std::cos(w * k * apart + phase));
     }
-    scene_.effects.motions.push_back({row, course});
-    v = reference::PlainCurve(course).derivative(1, 0);
+    v = reference::PlainCurve(motion).derivative(1, 0);
+    scene_.effects.motions.push_back(std::move(motion));
     const auto of_it = [row = row](const auto& entry) { return entry.row == row; };
     std::erase_if(scene_.effects.friction, of_it);
     std::erase_if(scene_.effects.limits, of_it);

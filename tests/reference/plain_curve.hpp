@@ -12,14 +12,19 @@ namespace linden::reference {
 
 class PlainCurve {
  public:
-  explicit PlainCurve(const Course& points) : times_(points.times), last_(points.values.back()), first_(points.values.front()) {
-    const int n = static_cast<int>(times_.size());
-    std::vector<double> d;  // d[k + 2]: slope of the line from point k on
-    for (int k = -2; k < n + 1; ++k) d.push_back(line(points, k));
-    for (int k = 0; k + 1 < n; ++k) {
-      const double from = slope(d, k), to = slope(d, k + 1);
-      const double length = at(times_, k + 1) - at(times_, k), rise = at(points.values, k + 1) - at(points.values, k);
-      pieces_.push_back({at(points.values, k), from, (3 * rise / length - 2 * from - to) / length, (from + to - 2 * rise / length) / (length * length)});
+  explicit PlainCurve(const JointMotion& motion)
+      : times_(motion.position.times), first_(motion.position.values.front()), last_(motion.position.values.back()) {
+    const std::vector<double>& values = motion.position.values;
+    const std::size_t n = times_.size();
+    std::vector<double> rise(n, 0.0);  // of the line from each point to the next, per second
+    for (std::size_t k = 0; k + 1 < n; ++k) rise[k] = (values[k + 1] - values[k]) / (times_[k + 1] - times_[k]);
+    std::vector<double> slope = motion.velocities;
+    if (slope.empty()) {
+      for (std::size_t k = 0; k < n; ++k) slope.push_back(slope_at(k, rise));
+    }
+    for (std::size_t k = 0; k + 1 < n; ++k) {
+      const double T = times_[k + 1] - times_[k];
+      pieces_.push_back({values[k], slope[k], (3 * rise[k] - 2 * slope[k] - slope[k + 1]) / T, (slope[k] + slope[k + 1] - 2 * rise[k]) / (T * T)});
     }
   }
 
@@ -36,27 +41,31 @@ class PlainCurve {
   }
 
  private:
-  static double at(const std::vector<double>& list, int k) { return list[static_cast<std::size_t>(k)]; }
+  double length(std::size_t k) const { return times_[k + 1] - times_[k]; }
 
-  /// Beyond the ends lines go on as the last two bend.
-  static double line(const Course& points, int k) {
-    const int lines = static_cast<int>(points.times.size()) - 1;
-    if (lines < 1) return 0;
-    if (k >= 0 && k < lines) return (at(points.values, k + 1) - at(points.values, k)) / (at(points.times, k + 1) - at(points.times, k));
-    if (lines == 1) return line(points, 0);
-    return k < 0 ? 2 * line(points, k + 1) - line(points, k + 2) : 2 * line(points, k - 1) - line(points, k - 2);
+  double slope_at(std::size_t k, const std::vector<double>& rise) const {
+    const std::size_t n = times_.size();
+    if (n == 1) return 0;
+    if (n == 2) return rise[0];
+    if (k == 0) return at_end(rise[0], rise[1], length(0), length(1));
+    if (k == n - 1) return at_end(rise[n - 2], rise[n - 3], length(n - 2), length(n - 3));
+    const double before = rise[k - 1], after = rise[k];
+    if ((before > 0) != (after > 0) || before == 0 || after == 0) return 0;
+    // the longer side weighs less
+    const double share = (length(k - 1) + 2 * length(k)) / (3 * (length(k - 1) + length(k)));
+    return 1 / (share / before + (1 - share) / after);
   }
 
-  /// At point k, with Akima's weights; what goes straight on both before and after it, the slower.
-  static double slope(const std::vector<double>& d, int k) {
-    const auto weigh = [](double x, double y) { return std::abs(x - y) + 1e-9 * std::abs(x + y); };
-    const double before = at(d, k + 1), after = at(d, k + 2);
-    const double w_before = weigh(at(d, k + 3), after), w_after = weigh(before, at(d, k));
-    return w_before + w_after == 0 ? 0 : (w_before * before + w_after * after) / (w_before + w_after);
+  static double at_end(double near, double far, double h, double next) {
+    // derivative of the parabola through three points at the outer one
+    const double parabola = near + (near - far) * h / (h + next);
+    if (near == 0 || (parabola > 0) != (near > 0)) return 0;
+    const bool turns = (near > 0) != (far > 0) && far != 0;
+    return turns && std::abs(parabola) > 3 * std::abs(near) ? 3 * near : parabola;
   }
 
   std::vector<double> times_;
-  double last_, first_;
+  double first_, last_;
   std::vector<std::array<double, 4>> pieces_;  // powers of the time since each began
 };
 

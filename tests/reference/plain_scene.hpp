@@ -127,7 +127,7 @@ class PlainScene {
       G = MatrixXd::Zero(tree.velocities, static_cast<Eigen::Index>(effects.motions.size()));
       for (const JointMotion& motion : effects.motions) {
         G(motion.row, static_cast<Eigen::Index>(moved.size())) = 1;
-        moved.push_back({motion.row, PlainCurve(motion.position)});
+        moved.push_back({motion.row, PlainCurve(motion)});
         bends(motion.position);
       }
       Index column = 0;
