@@ -260,7 +260,7 @@ std::string axis_label(const QuantityTrace& trace) {
   return trace.array == "contacts" ? "contact points that push" : "normal forces [N]";
 }
 
-/// Those of the rows that vary most, as many as can be told apart, in their order.
+/// Those of the rows that vary most, as many as can be told apart, in their order; of more than that none that does not vary, but all were so.
 std::vector<std::size_t> drawn_rows(const QuantityTrace& trace) {
   constexpr std::size_t kMostDrawn = 12;
   std::vector<std::size_t> rows(trace.rows.size());
@@ -273,6 +273,7 @@ std::vector<std::size_t> drawn_rows(const QuantityTrace& trace) {
   }
   std::ranges::stable_sort(rows, std::greater(), [&](std::size_t row) { return range[row]; });
   rows.resize(kMostDrawn);
+  if (range[rows.front()] > 0) std::erase_if(rows, [&](std::size_t row) { return range[row] == 0; });
   std::ranges::sort(rows);
   return rows;
 }
