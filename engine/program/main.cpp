@@ -7,26 +7,18 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <cmath>
-#include <cstdint>
 #include <new>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <system_error>
-#include <type_traits>
 #include <vector>
 
 #include "engine/program/accuracy_command.hpp"
 #include "engine/program/inspect.hpp"
-#include "engine/program/randomize.hpp"
+#include "engine/program/option_texts.hpp"
 #include "engine/program/rollout_command.hpp"
 #include "engine/program/run_command.hpp"
 #include "engine/program/scaling_command.hpp"
 #include "engine/scene/load_model.hpp"
-#include "engine/scene/scene_file.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
@@ -34,164 +26,6 @@
 
 namespace linden {
 namespace {
-
-/// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
-struct Texts {
-  std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      what, shape, dofs, steps, budget, start, density, randomize;
-};
-
-std::array<double, 3> gravity_from(const std::string& text) {
-  constexpr std::string_view expected = "three numbers x,y,z in m/s^2, such as 0,0,-9.81";
-  std::array<double, 3> gravity{};
-  std::size_t begin = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::size_t end = k < 2 ? text.find(',', begin) : text.size();
-    double value = 0;
-    const auto [rest, error] = std::from_chars(text.data() + begin, text.data() + std::min(end, text.size()), value);
-    if (end == text.npos || error != std::errc{} || rest != text.data() + end) {
-      throw InputError(fmt::format("--gravity \"{}\": expected {}", text, expected));
-    }
-    gravity[k] = value;
-    begin = end + 1;
-  }
-  return gravity;
-}
-
-std::optional<double> density_from(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const double density = number_from("--density", text, "kg/m^3, such as 1000");
-  if (!(density > 0) || !std::isfinite(density)) {
-    throw InputError(fmt::format("--density {}: expected a finite number above zero [kg/m^3], such as 1000", text));
-  }
-  return density;
-}
-
-void read_model_options(const Texts& texts, std::optional<Base>& base, Options& options) {
-  if (!texts.base.empty()) base = base_from(texts.base);
-  if (!texts.gravity.empty()) options.gravity = gravity_from(texts.gravity);
-}
-
-void read_motion_options(const Texts& texts, MotionArguments& motion, Options& options) {
-  read_model_options(texts, motion.base, options);
-  motion.density = density_from(texts.density);
-  motion.gravity_given = !texts.gravity.empty();
-  if (!texts.start.empty() && texts.start != "as-given" && texts.start != "checked") {
-    throw InputError(fmt::format("--start {}: expected checked or as-given", texts.start));
-  }
-  motion.start_as_given = texts.start == "as-given";
-  if (!texts.duration.empty()) motion.duration = number_from("--duration", texts.duration, "seconds, such as 10");
-  if (!texts.dt.empty()) options.step = number_from("--dt", texts.dt, "seconds, such as 1e-3");
-  if (!texts.tolerance.empty()) {
-    options.tolerance = number_from("--tolerance", texts.tolerance, "a number, such as 1e-10");
-    options.reduction = 0;
-  }
-  if (!texts.seed.empty()) {
-    const std::int64_t seed = integer_from("--seed", texts.seed, "a whole number, zero or more");
-    if (seed < 0) throw InputError(fmt::format("--seed {}: expected a whole number, zero or more", seed));
-    motion.seed = static_cast<std::uint64_t>(seed);
-  }
-  if (!texts.spread.empty()) motion.spread = number_from("--spread", texts.spread, "a number (rad, m, and per second), such as 0.1");
-}
-
-/// What `read` takes from the command line goes over the scene that the arguments name, if they name one.
-template <class Arguments, class Read>
-void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
-  read();
-  if (!is_scene(arguments.model)) return;
-  if (arguments.base) {
-    throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", arguments.model));
-  }
-  SceneStart start;
-  start.density = arguments.density;
-  if constexpr (std::is_base_of_v<MotionArguments, Arguments> && !std::is_same_v<Arguments, RolloutArguments>) {
-    if (arguments.spread) check_spread(*arguments.spread);
-    start.seed = arguments.seed;
-    start.spread = arguments.spread;
-  }
-  arguments.scene = std::make_shared<const Scene>(load_scene(arguments.model, start));
-  options = arguments.scene->options;
-  if constexpr (std::is_base_of_v<MotionArguments, Arguments>) arguments.duration = arguments.scene->duration;
-  read();
-}
-
-void read_order(const Texts& texts, Options& options) {
-  if (texts.order.empty()) return;
-  const std::int64_t order = integer_from("--order", texts.order, "2, 4, 6 or 8");
-  if (order < 2 || order > 8 || order % 2 != 0) throw InputError(fmt::format("--order {}: expected 2, 4, 6 or 8", order));
-  // a tolerance that nobody chose goes with the order
-  const bool chosen = !texts.tolerance.empty() || options.tolerance != default_tolerance(options.order);
-  options.order = static_cast<int>(order);
-  if (!chosen) use_default_tolerance(options);
-}
-
-template <class Arguments>
-void read_recording_options(const Texts& texts, Arguments& arguments) {
-  if (!texts.every.empty()) arguments.every = integer_from("--every", texts.every, "steps between frames, such as 10");
-  if (!texts.what.empty()) arguments.what = quantities_from(texts.what);
-}
-
-void read_randomize_option(const Texts& texts, MotionArguments& motion) {
-  if (motion.scene) motion.randomization = motion.scene->randomization;
-  if (!texts.randomize.empty()) randomize_from(texts.randomize, motion.effects(), motion.randomization);
-}
-
-void read_run_options(const Texts& texts, RunArguments& run) {
-  read_over_scene(run, run.options, [&] { read_motion_options(texts, run, run.options); });
-  read_randomize_option(texts, run);
-  // with a seed a randomised run finds its masses again
-  if (!run.load.empty() && (run.spread || (run.seed && !run.randomization.any()))) {
-    throw InputError("--load continues a run, --seed and --spread start one at random: leave one of them out");
-  }
-  read_recording_options(texts, run);
-  if (!texts.solver.empty()) run.options.solver = solver_from(texts.solver);
-  if (!texts.guess.empty()) run.options.guess = guess_from(texts.guess);
-  if (!texts.stop.empty()) run.options.stop = stop_from(texts.stop);
-  read_order(texts, run.options);
-}
-
-void read_rollout_options(const Texts& texts, RolloutArguments& rollout) {
-  read_over_scene(rollout, rollout.options, [&] { read_motion_options(texts, rollout, rollout.options); });
-  read_randomize_option(texts, rollout);
-  if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
-  read_recording_options(texts, rollout);
-  read_order(texts, rollout.options);
-  if (!texts.threads.empty()) {
-    const std::int64_t threads = integer_from("--threads", texts.threads, "how many, such as 8; 0 for all there are");
-    rollout.options.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
-  }
-  if (!texts.instructions.empty()) rollout.options.instructions = instructions_from(texts.instructions);
-}
-
-void read_scaling_options(const Texts& texts, ScalingArguments& scaling) {
-  MotionArguments motion;
-  motion.seed = scaling.seed;
-  motion.spread = scaling.spread;
-  read_motion_options(texts, motion, scaling.options);
-  scaling.seed = *motion.seed;
-  scaling.spread = *motion.spread;
-  if (!texts.shape.empty()) scaling.shape = scaling_shape_from(texts.shape);
-  if (!texts.dofs.empty()) scaling.sizes = scaling_sizes_from(texts.dofs);
-  if (!texts.solver.empty()) scaling.solvers = scaling_solvers_from(texts.solver);
-  if (!texts.steps.empty()) scaling.steps = integer_from("--steps", texts.steps, "how many, such as 100");
-  if (texts.duration.empty()) return;
-  if (scaling.steps) throw InputError("--duration and --steps both say how long: leave one of them out");
-  check(scaling.options);
-  scaling.steps = step_count(motion, scaling.options.step);
-}
-
-void read_accuracy_options(const Texts& texts, AccuracyArguments& accuracy) {
-  read_over_scene(accuracy, accuracy.options, [&] { read_motion_options(texts, accuracy, accuracy.options); });
-  if (!texts.budget.empty()) accuracy.budget = number_from("--budget", texts.budget, "seconds, such as 60");
-}
-
-void read_inspect_options(const Texts& texts, InspectArguments& inspect) {
-  read_over_scene(inspect, inspect.options, [&] {
-    read_model_options(texts, inspect.base, inspect.options);
-    inspect.density = density_from(texts.density);
-  });
-  if (!texts.solver.empty()) inspect.options.solver = solver_from(texts.solver);
-}
 
 constexpr const char* kSceneHelp = "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
 constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
@@ -211,32 +45,32 @@ struct Adding {
   void model(std::string& name, const char* help = kModelHelp) const {
     command->add_option("MODEL", name, help)->required()->option_text(" ")->check(filled);
   }
-  void base(const char* group, Texts& texts) const {
+  void base(const char* group, OptionTexts& texts) const {
     (*this)(group, "--base", texts.base, "fixed|floating", "root of a URDF file: fixed (default) or on a free joint");
   }
-  void density(const char* group, Texts& texts) const {
+  void density(const char* group, OptionTexts& texts) const {
     (*this)(group, "--density", texts.density, "D", "[kg/m^3] give links of a URDF without inertia the mass of their shapes, such as 1000");
   }
   void strict(const char* group, bool& strict) const {
     command->add_flag("--strict", strict, "refuse a model or scene that gives warnings")->group(group);
   }
-  void duration(Texts& texts) const { (*this)("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10"); }
-  void step(Texts& texts) const { (*this)("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3"); }
-  void gravity(const char* group, Texts& texts) const {
+  void duration(OptionTexts& texts) const { (*this)("Motion", "--duration", texts.duration, "S", "simulated time [s], default 10"); }
+  void step(OptionTexts& texts) const { (*this)("Motion", "--dt", texts.dt, "S", "step [s], default 1e-3"); }
+  void gravity(const char* group, OptionTexts& texts) const {
     (*this)(group, "--gravity", texts.gravity, "X,Y,Z", "[m/s^2], default 0,0,-9.81; 0,0,0 for none");
   }
-  void spread(const char* group, Texts& texts) const {
+  void spread(const char* group, OptionTexts& texts) const {
     (*this)(group, "--spread", texts.spread, "R", "their range [rad, m, and per second], default 0.1");
   }
-  void randomize(const char* group, Texts& texts) const {
+  void randomize(const char* group, OptionTexts& texts) const {
     (*this)(group, "--randomize", texts.randomize, "NAME=RANGE,...", "draw masses, friction, joint_friction or gains; see below");
   }
-  void start(const char* group, Texts& texts) const {
+  void start(const char* group, OptionTexts& texts) const {
     (*this)(group, "--start", texts.start, "RULE", "checked (default): a scene may not begin outside limits or in the ground; or as-given");
   }
 };
 
-CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
+CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
   CLI::App* command = program.add_subcommand("run", "Simulate one model or scene.");
   const Adding add{command};
   add.model(run.model, kSceneHelp);
@@ -278,7 +112,7 @@ CLI::App* add_run(CLI::App& program, Texts& texts, RunArguments& run) {
   return command;
 }
 
-CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout) {
+CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& rollout) {
   CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model or scene at once.");
   const Adding add{command};
   add.model(rollout.model, kSceneHelp);
@@ -315,7 +149,7 @@ CLI::App* add_rollout(CLI::App& program, Texts& texts, RolloutArguments& rollout
   return command;
 }
 
-CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling) {
+CLI::App* add_scaling(CLI::App& program, OptionTexts& texts, ScalingArguments& scaling) {
   CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
   const Adding add{command};
   add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random or humanoids");
@@ -337,7 +171,7 @@ CLI::App* add_scaling(CLI::App& program, Texts& texts, ScalingArguments& scaling
   return command;
 }
 
-CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accuracy) {
+CLI::App* add_accuracy(CLI::App& program, OptionTexts& texts, AccuracyArguments& accuracy) {
   CLI::App* command =
       program.add_subcommand("accuracy", "Measure what accuracy costs on a model or scene, and say which method to use.");
   const Adding add{command};
@@ -363,7 +197,7 @@ CLI::App* add_accuracy(CLI::App& program, Texts& texts, AccuracyArguments& accur
   return command;
 }
 
-CLI::App* add_inspect(CLI::App& program, Texts& texts, InspectArguments& inspect) {
+CLI::App* add_inspect(CLI::App& program, OptionTexts& texts, InspectArguments& inspect) {
   CLI::App* command =
       program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
   const Adding add{command};
@@ -419,7 +253,7 @@ int run_program(int argc, char** argv) {
                  "all is written and keeps its mode and owner; of a symbolic link, what it leads to is replaced and the link stays.\n\n"
                  "linden COMMAND --help says more.");
   program.get_formatter()->column_width(30);
-  Texts texts;
+  OptionTexts texts;
   RunArguments run_arguments;
   RolloutArguments rollout_arguments;
   ScalingArguments scaling_arguments;
