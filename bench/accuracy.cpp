@@ -24,10 +24,10 @@
 #include <random>
 #include <stdexcept>
 
+#include "engine/baseline/baseline.hpp"
 #include "engine/program/accuracy_report.hpp"
-#include "engine/step/baseline.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/reference/closed_forms.hpp"
 
 namespace {

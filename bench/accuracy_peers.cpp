@@ -28,8 +28,8 @@
 #include "bench/apart.hpp"
 #include "bench/installed_peers.hpp"
 #include "engine/drift.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace {
 

@@ -15,14 +15,14 @@
 
 #include "bench/machine.hpp"
 #include "engine/initial_state.hpp"
-#include "kernels/advance_down.hpp"
-#include "kernels/innovation_up.hpp"
-#include "kernels/momentum_update_map.hpp"
-#include "kernels/newton_factor_up.hpp"
-#include "kernels/residual_up.hpp"
+#include "kernels/block/advance_down.hpp"
+#include "kernels/tree/innovation_up.hpp"
+#include "kernels/tree/momentum_update_map.hpp"
+#include "kernels/tree/newton_factor_up.hpp"
+#include "kernels/tree/residual_up.hpp"
 #include "layout/state.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace linden {
 namespace {

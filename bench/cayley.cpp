@@ -4,7 +4,7 @@
 //
 //   build/release/bench/bench_cayley
 //
-//   log      hV = log dT,              h mu = dlog_hV^T G hV        kernels/momentum_map.hpp
+//   log      hV = log dT,              h mu = dlog_hV^T G hV        kernels/tree/momentum_map.hpp
 //   cayley   hV~ = 2 v~ / w~           h mu = dcay_hV^T G hV        (v~, w~) the dual quaternion of dT
 //
 // Over dual numbers the inverse derivative of the Cayley map is y - 1/2 u x y + 1/4 u (u . y): that of log with a = 1/4 and b = 1 instead
@@ -23,21 +23,21 @@
 
 #include "engine/initial_state.hpp"
 #include "engine/simulation.hpp"
-#include "kernels/advance_map.hpp"
-#include "kernels/displacement_down.hpp"
-#include "kernels/gravity.hpp"
-#include "kernels/impulse_pass_up.hpp"
-#include "kernels/increment_down.hpp"
-#include "kernels/momentum_map.hpp"
-#include "kernels/momentum_update_map.hpp"
-#include "kernels/motion_map.hpp"
-#include "kernels/newton_factor_up.hpp"
-#include "kernels/placement_map.hpp"
-#include "kernels/residual_up.hpp"
+#include "kernels/tree/advance_map.hpp"
+#include "kernels/tree/displacement_down.hpp"
+#include "kernels/tree/gravity.hpp"
+#include "kernels/tree/impulse_pass_up.hpp"
+#include "kernels/tree/increment_down.hpp"
+#include "kernels/tree/momentum_map.hpp"
+#include "kernels/tree/momentum_update_map.hpp"
+#include "kernels/tree/motion_map.hpp"
+#include "kernels/tree/newton_factor_up.hpp"
+#include "kernels/tree/placement_map.hpp"
+#include "kernels/tree/residual_up.hpp"
 #include "layout/state.hpp"
-#include "layout/urdf.hpp"
 #include "layout/workspace.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/reference/closed_forms.hpp"
 
 namespace {

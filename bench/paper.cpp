@@ -28,12 +28,12 @@
 
 #include "bench/comparators/integrator.hpp"
 #include "bench/machine.hpp"
+#include "engine/baseline/baseline.hpp"
 #include "engine/files/output_file.hpp"
 #include "engine/program/plot.hpp"
 #include "engine/simulation.hpp"
-#include "engine/step/baseline.hpp"
-#include "models/generators.hpp"
-#include "models/random.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/random.hpp"
 
 namespace linden {
 namespace {

@@ -25,7 +25,7 @@
 
 #include "bench/installed_peers.hpp"
 #include "bench/machine.hpp"
-#include "layout/urdf.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace linden {
 namespace {

@@ -18,8 +18,8 @@
 #include "engine/batch.hpp"
 #include "engine/drift.hpp"
 #include "engine/initial_state.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace {
 

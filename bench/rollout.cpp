@@ -14,8 +14,8 @@
 #include "bench/machine.hpp"
 #include "engine/batch.hpp"
 #include "engine/initial_state.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace linden {
 namespace {

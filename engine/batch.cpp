@@ -12,10 +12,10 @@
 #include <thread>
 
 #include "engine/required_model.hpp"
-#include "engine/step/instance_stepper.hpp"
+#include "engine/solve/instance_stepper.hpp"
 #include "engine/threads.hpp"
-#include "layout/input_error.hpp"
 #include "layout/packed_history.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

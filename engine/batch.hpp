@@ -28,7 +28,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "engine/step/block_stepper.hpp"
+#include "engine/solve/block_stepper.hpp"
 #include "layout/effects.hpp"
 
 namespace linden {
@@ -138,7 +138,7 @@ class BatchOf {
 
   BatchView<const Real> positions() const;
   BatchView<const Real> momenta() const;
-  /// Velocities of the motion (engine/step/velocity.md) and energy (kinetic, potential [J]) of all instances, computed at every call.
+  /// Velocities of the motion (engine/VELOCITY.md) and energy (kinetic, potential [J]) of all instances, computed at every call.
   struct Observation {
     std::vector<Real> velocity_numbers, energy_numbers;
     Index nv;

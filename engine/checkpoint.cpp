@@ -3,9 +3,9 @@
 //   "linden checkpoint 6\n"
 //   header: model hash, step, gravity, counts, steps taken, valid rows of history, order, count of the stepper's numbers, bytes of the text
 //   that follows (little endian, as laid out below)
-//   kinds of effects and what they act on (engine/effect_owners.hpp); their numbers may be others
+//   kinds of effects and what they act on (engine/effects/effect_owners.hpp); their numbers may be others
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
-//   where a step has sub-steps, what their first guesses know (engine/step/stage_guess.hpp): counts, numbers
+//   where a step has sub-steps, what their first guesses know (engine/guess/stage_guess.hpp): counts, numbers
 //   what effects or the solver keep from step to step, 8 bytes a number
 //   FNV-1a over all of it
 //
@@ -19,11 +19,11 @@
 #include <fstream>
 #include <system_error>
 
-#include "engine/effect_owners.hpp"
+#include "engine/effects/effect_owners.hpp"
 #include "engine/files/output_file.hpp"
 #include "engine/simulation.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

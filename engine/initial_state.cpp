@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 
 namespace linden {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "kernels/placement_map.hpp"
+#include "kernels/tree/placement_map.hpp"
 
 namespace linden {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <span>
 
-#include "engine/step/composition.hpp"
-#include "layout/input_error.hpp"
+#include "engine/compose/composition.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

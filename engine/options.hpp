@@ -30,7 +30,7 @@ enum class StopTest {
 
 struct Options {
   double step = 1e-3;                           // h [s]
-  int order = 2;                                // 2, 4, 6 or 8 (engine/step/composition.hpp)
+  int order = 2;                                // 2, 4, 6 or 8 (engine/compose/composition.hpp)
   std::array<double, 3> gravity{0, 0, -9.81};   // [m/s^2]; zero: the scene has none and nothing is computed for it
   Solver solver = Solver::newton;
   FirstGuess guess = FirstGuess::extrapolation;

@@ -8,9 +8,9 @@
 
 #include "engine/batch.hpp"
 #include "engine/scene/scene.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
-#include "models/random.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
+#include "models/build/random.hpp"
 
 namespace linden {
 namespace {

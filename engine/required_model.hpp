@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "layout/input_error.hpp"
 #include "layout/model.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 

@@ -6,15 +6,15 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/compose/composition.hpp"
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
+#include "engine/solve/instance_stepper.hpp"
 #include "engine/start_check.hpp"
-#include "engine/step/composition.hpp"
-#include "engine/step/instance_stepper.hpp"
 #include "engine/threads.hpp"
-#include "kernels/mimic.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "kernels/tree/mimic.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 

@@ -21,9 +21,9 @@
 #include <string>
 #include <vector>
 
-#include "engine/passive_watch.hpp"
-#include "engine/step/stage_guess.hpp"
-#include "engine/step/stepper.hpp"
+#include "engine/effects/passive_watch.hpp"
+#include "engine/guess/stage_guess.hpp"
+#include "engine/solve/stepper.hpp"
 #include "layout/effects.hpp"
 
 namespace linden {
@@ -61,7 +61,7 @@ class Simulation {
 
   std::span<const double> positions() const { return state_.q.flat(); }
   std::span<const double> momenta() const { return state_.p.flat(); }
-  /// Velocities of the motion: one O(n) solve (engine/step/velocity.md).
+  /// Velocities of the motion: one O(n) solve (engine/VELOCITY.md).
   std::vector<double> velocities();
 
   /// Throw InputError for a wrong count or a number that is not finite. Quaternions are normalised; mimic joints follow their
@@ -113,7 +113,7 @@ class Simulation {
   /// What effects gave and took since the start, or since a checkpoint was loaded [J]. Total energy plus what was taken less what was given
   /// stays.
   const EffectWork& effect_work() const { return effect_work_; }
-  /// Effects that gave energy although they can only take it, since then: none where all is well (engine/passive_watch.hpp).
+  /// Effects that gave energy although they can only take it, since then: none where all is well (engine/effects/passive_watch.hpp).
   const std::vector<PassiveGift>& passive_gifts() const { return watch_->gifts(); }
   Momentum momentum();
 

@@ -10,11 +10,11 @@
 
 #include "engine/scene/scene.hpp"
 #include "kernels/effects/ground.hpp"
-#include "kernels/placement_map.hpp"
-#include "kernels/terrain_height.hpp"
-#include "kernels/world_placement_down.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "kernels/effects/terrain_height.hpp"
+#include "kernels/tree/placement_map.hpp"
+#include "kernels/tree/world_placement_down.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

@@ -18,8 +18,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/effects/effect_plan.hpp"
 #include "engine/options.hpp"
-#include "engine/step/effect_plan.hpp"
 #include "layout/effects.hpp"
 #include "layout/model.hpp"
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <charconv>
 
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

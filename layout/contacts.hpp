@@ -1,6 +1,6 @@
 // layout/contacts.hpp
 // Where bodies may touch the ground: the collision shapes of a robot's file, reduced to what a plane can meet first. The gap between one of
-// these and the ground is that of the shape (kernels/contact_geometry.hpp): a sphere or rim that rolls is met at its lowest place, whatever
+// these and the ground is that of the shape (kernels/effects/contact_geometry.hpp): a sphere or rim that rolls is met at its lowest place, whatever
 // material that is.
 //
 //   shape      spheres                         rims               blocks
@@ -12,8 +12,7 @@
 //
 // Blocks are for what a plane never meets first: ridges and peaks of a terrain.
 //
-// What coincides where a size is 0 is in here once. Files of meshes are read for this and nothing else: layout/mesh_path.hpp
-// finds them, layout/mesh_box.hpp reads them.
+// What coincides where a size is 0 is in here once. models/shapes/contacts_of.hpp works them out.
 //
 // All in the frame of the body that carries the link (slot 0: fixed to the world, never in here).
 #pragma once
@@ -57,11 +56,5 @@ struct Contacts {
   std::vector<ContactBlock> blocks;    // sorted by slot
   bool empty() const { return spheres.empty() && rims.empty(); }
 };
-
-struct Model;
-
-/// Contact points of all shapes of a model. Notes say which meshes were not found or not read, and so touch nothing, and how many
-/// stand as boxes.
-Contacts contacts_of(const Model& model, std::vector<std::string>& notes);
 
 }  // namespace linden

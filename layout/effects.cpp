@@ -10,9 +10,9 @@
 #include <unordered_set>
 #include <utility>
 
-#include "layout/input_error.hpp"
 #include "layout/model.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

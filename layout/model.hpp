@@ -15,7 +15,7 @@
 namespace linden {
 
 /// What is fixed to the world, in its frame: it moves nothing and is no part of subtree_mass, but where the model is hung from a link that
-/// moves (layout/merged_models.hpp).
+/// moves (models/build/merged_models.hpp).
 struct Welded {
   std::array<double, 10> inertia{};  // m [kg], m c [kg m], xx xy xz yy yz zz about the origin [kg m^2]
   std::vector<BodyShape> shapes;     // of slot 0

@@ -22,7 +22,7 @@
 //
 // The parent of a body lies in its own branch or in the trunk. A sweep from the root and the sweep back can therefore go over one branch
 // both ways while its memory is in the cache, and then over the next. Subtrees smaller than a branch make its levels wide: scans put
-// bodies of one level in the lanes (kernels/body_lanes.hpp). Children of one body of the trunk are kept together where they fit: branches
+// bodies of one level in the lanes (kernels/values/body_lanes.hpp). Children of one body of the trunk are kept together where they fit: branches
 // that add to nothing in common can be gone over by several threads at once, with the same result to the bit.
 //
 // Three joint kinds, three loops. A body's frame sits at its joint, turned so that the joint's axis is z:

@@ -1,6 +1,6 @@
 // layout/workspace.hpp
 // Scratch of one thread: what the sweeps of a step hand to each other. Nothing in it outlives a step, so a thread needs one
-// workspace however many instances it steps. All impulses are carried times h (see kernels/momentum_map.hpp).
+// workspace however many instances it steps. All impulses are carried times h (see kernels/tree/momentum_map.hpp).
 #pragma once
 
 #include <type_traits>

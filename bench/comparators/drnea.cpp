@@ -1,13 +1,13 @@
 #include "bench/comparators/drnea.hpp"
 
 #include "bench/comparators/drnea_derivative.hpp"
-#include "kernels/displacement_down.hpp"
-#include "kernels/increment_down.hpp"
-#include "kernels/momentum_map.hpp"
-#include "kernels/momentum_update_map.hpp"
-#include "kernels/motion_map.hpp"
-#include "kernels/newton_factor_up.hpp"
-#include "kernels/residual_up.hpp"
+#include "kernels/tree/displacement_down.hpp"
+#include "kernels/tree/increment_down.hpp"
+#include "kernels/tree/momentum_map.hpp"
+#include "kernels/tree/momentum_update_map.hpp"
+#include "kernels/tree/motion_map.hpp"
+#include "kernels/tree/newton_factor_up.hpp"
+#include "kernels/tree/residual_up.hpp"
 
 namespace linden::comparators {
 

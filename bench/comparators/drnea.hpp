@@ -4,7 +4,7 @@
 //   L_d = h/2 L(T^k, V^k) + h/2 L(T^k+1, V^k),  V = 1/h log dT          (9), (10)
 //
 // cost    O(n); O(n^2) with the derivative
-// source  the paper, (19)-(22), in the displacement form of kernels/displacement_down.hpp
+// source  the paper, (19)-(22), in the displacement form of kernels/tree/displacement_down.hpp
 #pragma once
 
 #include "bench/comparators/ancestry.hpp"
@@ -22,7 +22,7 @@ class Drnea : public Equation {
   void momentum(const StepStart& end, Field<double>& p) override;
 
   Index rows() const { return target_.rows(); }
-  /// Factors the exact derivative where the residual was taken last, in O(n) (kernels/newton_factor_up.hpp) ...
+  /// Factors the exact derivative where the residual was taken last, in O(n) (kernels/tree/newton_factor_up.hpp) ...
   void factor();
   /// ... and applies its inverse.
   void apply_inverse(const Field<double>& r, Field<double>& x);

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "kernels/se3.hpp"
+#include "kernels/values/se3.hpp"
 
 namespace linden::comparators {
 

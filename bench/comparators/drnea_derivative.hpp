@@ -9,7 +9,7 @@
 //     J_ij = S_i^T d(h F_i)/dq_j                                                              line 10
 //
 // The paper writes the derivative of dT as a 4 x 4 matrix; as a twist in the body's frame it obeys the same recursion in six
-// numbers. Lines 5 and 8 are the same linear map for every column, K_i (kernels/se3.hpp, pose_derivative), and are formed once a
+// numbers. Lines 5 and 8 are the same linear map for every column, K_i (kernels/values/se3.hpp, pose_derivative), and are formed once a
 // body. Outside the subtree of j and its path all is zero.
 //
 // reads   placement 12 x n at q^k, motion 7 x n, displacement 7 x n, of the residual

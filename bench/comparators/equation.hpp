@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "kernels/articulated.hpp"
+#include "kernels/tree/articulated.hpp"
 #include "layout/model.hpp"
 #include "layout/state.hpp"
 #include "layout/workspace.hpp"

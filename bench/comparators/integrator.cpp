@@ -10,11 +10,11 @@
 #include "bench/comparators/riqn.hpp"
 #include "bench/comparators/svi.hpp"
 #include "bench/comparators/svi_log.hpp"
-#include "kernels/articulated_inertia_up.hpp"
-#include "kernels/gravity.hpp"
-#include "kernels/impulse_up.hpp"
-#include "kernels/placement_map.hpp"
-#include "kernels/velocity_down.hpp"
+#include "kernels/tree/articulated_inertia_up.hpp"
+#include "kernels/tree/gravity.hpp"
+#include "kernels/tree/impulse_up.hpp"
+#include "kernels/tree/placement_map.hpp"
+#include "kernels/tree/velocity_down.hpp"
 
 namespace linden::comparators {
 namespace {

@@ -1,6 +1,6 @@
 #include "bench/comparators/riqn.hpp"
 
-#include "kernels/increment_down.hpp"
+#include "kernels/tree/increment_down.hpp"
 
 namespace linden::comparators {
 

@@ -1,7 +1,7 @@
 #include "bench/comparators/svi.hpp"
 
-#include "kernels/gravity.hpp"
-#include "kernels/placement_map.hpp"
+#include "kernels/tree/gravity.hpp"
+#include "kernels/tree/placement_map.hpp"
 
 namespace linden::comparators {
 namespace {

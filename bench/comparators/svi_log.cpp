@@ -1,9 +1,9 @@
 #include "bench/comparators/svi_log.hpp"
 
-#include "kernels/displacement_down.hpp"
-#include "kernels/momentum_map.hpp"
-#include "kernels/momentum_update_map.hpp"
-#include "kernels/motion_map.hpp"
+#include "kernels/tree/displacement_down.hpp"
+#include "kernels/tree/momentum_map.hpp"
+#include "kernels/tree/momentum_update_map.hpp"
+#include "kernels/tree/motion_map.hpp"
 
 namespace linden::comparators {
 

@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "engine/files/leftovers.hpp"
 #include "engine/standard_streams.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 

@@ -10,8 +10,8 @@
 #include <optional>
 #include <span>
 
+#include "engine/compose/composition.hpp"
 #include "engine/program/accuracy_mover.hpp"
-#include "engine/step/composition.hpp"
 
 namespace linden {
 namespace {

@@ -2,7 +2,7 @@
 // What accuracy costs on one scene: every method over a ladder of steps, against a reference that two independent methods agree
 // on.
 //
-//   methods    orders 2, 4, 6, 8 of linden; RK4 and semi-implicit Euler, as other engines step (engine/step/baseline.hpp). Scenes with
+//   methods    orders 2, 4, 6, 8 of linden; RK4 and semi-implicit Euler, as other engines step (engine/baseline/baseline.hpp). Scenes with
 //              damping, servos, torques, wrenches or drag have no orders above 2; with friction, limits or ground there is but
 //              order 2
 //   steps      16, 8, 4, 2, 1, 1/2, 1/4 times the step of the options

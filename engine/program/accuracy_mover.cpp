@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "engine/baseline/baseline.hpp"
 #include "engine/batch.hpp"
-#include "engine/step/baseline.hpp"
 
 namespace linden {
 namespace {

@@ -22,7 +22,7 @@
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

@@ -9,8 +9,8 @@
 #include "engine/initial_state.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
-#include "layout/text_file.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/text_file.hpp"
 
 namespace linden {
 namespace {

@@ -10,7 +10,7 @@
 #include "engine/files/output_file.hpp"
 #include "engine/options.hpp"
 #include "engine/scene/scene.hpp"
-#include "layout/urdf.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace linden {
 

@@ -17,8 +17,8 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

@@ -2,7 +2,7 @@
 // What --record and --plot take beside time and energy: --what positions,velocities,servos,forces,energies,contacts.
 //
 //   positions   q
-//   velocities  v, of the motion (engine/step/velocity.md)
+//   velocities  v, of the motion (engine/VELOCITY.md)
 //   servos      force of each servo, mean over the step before [N m, N]
 //   forces      generalized forces of all effects together, likewise, row by row of v
 //   energies    kinetic energy, potentials of gravity, springs and ground, and what each effect took or gave since the start [J]

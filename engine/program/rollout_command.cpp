@@ -26,7 +26,7 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

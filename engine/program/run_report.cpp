@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "engine/compose/composition.hpp"
 #include "engine/program/effects_text.hpp"
 #include "engine/program/randomize.hpp"
 #include "engine/scene/load_model.hpp"
-#include "engine/step/composition.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
 

@@ -22,10 +22,10 @@
 #include "engine/simulation.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 #include "layout/workspace.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 
 namespace linden {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "engine/start_check.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {

@@ -11,7 +11,7 @@
 #include "engine/scene/scene_file.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 
 namespace linden {
 namespace {

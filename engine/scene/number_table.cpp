@@ -6,9 +6,9 @@
 #include <optional>
 #include <string_view>
 
-#include "layout/input_error.hpp"
-#include "layout/text_file.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/text_file.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "engine/scene/number_table.hpp"
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

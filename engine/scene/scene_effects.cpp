@@ -14,7 +14,8 @@
 #include "engine/scene/scene_servos.hpp"
 #include "engine/text.hpp"
 #include "layout/smooth_curve.hpp"
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
+#include "models/shapes/contacts_of.hpp"
 
 namespace linden {
 namespace {

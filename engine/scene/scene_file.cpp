@@ -9,16 +9,16 @@
 #include <unordered_set>
 #include <utility>
 
+#include "engine/effects/effect_plan.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_effects.hpp"
 #include "engine/scene/scene_yaml.hpp"
 #include "engine/start_check.hpp"
-#include "engine/step/effect_plan.hpp"
-#include "layout/merged_models.hpp"
 #include "layout/smooth_curve.hpp"
-#include "layout/text_file.hpp"
-#include "layout/words.hpp"
-#include "models/generators.hpp"
+#include "layout/support/text_file.hpp"
+#include "layout/support/words.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/merged_models.hpp"
 
 namespace linden {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "layout/effects.hpp"
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 

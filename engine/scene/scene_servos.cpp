@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "engine/scene/scene_course.hpp"
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

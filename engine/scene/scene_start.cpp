@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "layout/effects.hpp"
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

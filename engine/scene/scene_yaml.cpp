@@ -12,7 +12,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "layout/words.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

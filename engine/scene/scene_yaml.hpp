@@ -118,7 +118,7 @@ class SceneYaml {
 
 }  // namespace linden
 
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 

@@ -19,7 +19,7 @@
 #include <span>
 
 #include "kernels/effects/joint_impulses.hpp"
-#include "kernels/se3.hpp"
+#include "kernels/values/se3.hpp"
 #include "layout/effects.hpp"
 
 namespace linden {

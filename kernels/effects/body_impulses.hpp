@@ -17,9 +17,9 @@
 
 #include <span>
 
-#include "kernels/contact_geometry.hpp"
+#include "kernels/effects/contact_geometry.hpp"
 #include "kernels/effects/joint_impulses.hpp"
-#include "kernels/se3.hpp"
+#include "kernels/values/se3.hpp"
 
 namespace linden {
 

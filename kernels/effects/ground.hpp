@@ -5,14 +5,14 @@
 //   sticks    F_t = -b t                         as long as |F_t| <= friction N,    b = friction max(k depth^k, N_least) / (h creep)
 //   slides    F_t = -friction N t / |t|          as long as t does not turn back
 //
-// Gaps are of shapes (kernels/contact_geometry.hpp), rise = gap^k+1 - gap^k, and N acts along the wrench whose work is N rise. The difference
+// Gaps are of shapes (kernels/effects/contact_geometry.hpp), rise = gap^k+1 - gap^k, and N acts along the wrench whose work is N rise. The difference
 // quotient of P (a discrete gradient) then makes the work of the spring exactly -dP, also where a step begins above the ground and ends in it:
 // a bounce neither gains nor loses, and what rolls is neither driven nor held back. c' = c + (s - 1/2) h k.
 //
-// The feature of the ground that a point meets is that of the beginning of the step (kernels/terrain.hpp), the tangent plane of an edge or
+// The feature of the ground that a point meets is that of the beginning of the step (kernels/effects/terrain.hpp), the tangent plane of an edge or
 // corner that of the middle of it. Where a feature takes over from another, depth is found that no motion made. It must not become energy:
 // on a terrain the points of a body store no more at the beginning of a step than they did at the end of the last one (bore), and their
-// depths are all reduced by one factor where they would; what is missing comes back at kRecovery (engine/step/effect_plan.cpp). Without this
+// depths are all reduced by one factor where they would; what is missing comes back at kRecovery (engine/effects/effect_plan.cpp). Without this
 // one shape in two that tumbles over rough ground was given energy, a disc up to 89 J of 5. With it, of 200 shapes that tumbled for 3 s at 0.5
 // to 2 ms, 24 rose by more than 0.02 J and none by more than 0.21 J of 2 to 22 J; the most without damping at 2 ms. At a recovery of 10 mm/s
 // it was 1 % more. Energy is lost where a gap is less than it was, to the second order of the step over an edge that turns down.
@@ -40,11 +40,11 @@
 
 #include <optional>
 
-#include "kernels/contact_geometry.hpp"
 #include "kernels/effects/body_impulses.hpp"
+#include "kernels/effects/contact_geometry.hpp"
 #include "kernels/effects/friction.hpp"
 #include "kernels/effects/ground_plan.hpp"
-#include "kernels/terrain.hpp"
+#include "kernels/effects/terrain.hpp"
 
 namespace linden {
 

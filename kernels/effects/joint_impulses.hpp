@@ -24,7 +24,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "kernels/joints.hpp"
+#include "kernels/values/joints.hpp"
 
 namespace linden {
 

@@ -12,7 +12,7 @@
 // on it, and the joint rests there.
 //
 // With restitution e > 0 a step may be `passable`: joints that bounce and are not at their limit yet go through it, so that the solver
-// can find when the first of them meets it and strike there (engine/step/blows.hpp):
+// can find when the first of them meets it and strike there (engine/effects/blows.hpp):
 //
 //   v_n <- -e v_n,   p <- p - (1 + e) v_n / (M^-1)_nn  in the joint's row          Newton's law of impact
 //

@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "engine/simulation.hpp"
-#include "layout/urdf.hpp"
+#include "models/urdf/urdf.hpp"
 
 int main(int, char** arguments) {
   linden::Simulation simulation(linden::load_urdf(arguments[1], linden::Base::fixed), {.step = 1e-3});

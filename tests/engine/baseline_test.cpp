@@ -2,8 +2,8 @@
 // steps.
 #include <cmath>
 
-#include "engine/step/baseline.hpp"
-#include "layout/input_error.hpp"
+#include "engine/baseline/baseline.hpp"
+#include "layout/support/input_error.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"
 

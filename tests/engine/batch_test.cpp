@@ -7,9 +7,9 @@
 
 #include "engine/initial_state.hpp"
 #include "engine/simulation.hpp"
-#include "layout/input_error.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "layout/support/input_error.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace linden {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "engine/batch.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "scenes.hpp"
 
 namespace linden {

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "engine/simulation.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 #ifndef LINDEN_MODELS_DIR
 #define LINDEN_MODELS_DIR "models"

@@ -8,9 +8,9 @@
 #include <numeric>
 
 #include "engine/batch.hpp"
+#include "engine/compose/composition.hpp"
 #include "engine/scene/scene_file.hpp"
-#include "engine/step/composition.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"

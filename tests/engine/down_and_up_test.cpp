@@ -1,12 +1,12 @@
 // In which order a tree is gone over.
-#include "engine/step/down_and_up.hpp"
+#include "engine/sweeps/down_and_up.hpp"
 
 #include <oneapi/tbb/global_control.h>
 
 #include <catch2/catch.hpp>
 #include <memory>
 
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 
 namespace linden {
 namespace {

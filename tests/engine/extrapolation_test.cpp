@@ -1,4 +1,4 @@
-#include "engine/step/extrapolation.hpp"
+#include "engine/guess/extrapolation.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "engine/batch.hpp"
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "scenes.hpp"
 
 namespace linden {

@@ -7,8 +7,8 @@
 #include "engine/batch.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "folder.hpp"
-#include "models/generators.hpp"
-#include "models/random.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/random.hpp"
 #include "scenes.hpp"
 
 namespace linden {

@@ -1,5 +1,5 @@
 // The factor of a step outlasts it where the next can be solved with it.
-#include "engine/step/held_factor.hpp"
+#include "engine/solve/held_factor.hpp"
 
 #include <fmt/format.h>
 

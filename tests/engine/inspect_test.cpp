@@ -5,7 +5,7 @@
 #include <string>
 
 #include "engine/scene/scene_file.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 #include "tests/engine/command_line.hpp"
 
 namespace linden {

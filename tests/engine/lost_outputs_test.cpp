@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "engine/simulation.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "tests/engine/array_reader.hpp"
 #include "tests/engine/command_line.hpp"
 

@@ -6,12 +6,12 @@
 
 #include "engine/batch.hpp"
 #include "engine/simulation.hpp"
-#include "layout/builder.hpp"
-#include "layout/input_error.hpp"
 #include "layout/smooth_curve.hpp"
+#include "layout/support/input_error.hpp"
+#include "models/build/builder.hpp"
 #include "scenes.hpp"
-#include "tests/scratch_folder.hpp"
 #include "tests/reference/plain_curve.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace linden {
 namespace {

@@ -1,5 +1,5 @@
 // Effects that can only take energy are watched: one that gives is named, with the place, the time and the amount.
-#include "engine/passive_watch.hpp"
+#include "engine/effects/passive_watch.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -5,7 +5,8 @@
 
 #include "engine/initial_state.hpp"
 #include "layout/contacts.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/shapes/contacts_of.hpp"
 #include "tests/reference/closed_forms.hpp"
 #include "tests/reference/coriolis_plain.hpp"
 #include "tests/reference/plain_scene.hpp"

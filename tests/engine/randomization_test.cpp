@@ -11,8 +11,8 @@
 
 #include "engine/batch.hpp"
 #include "engine/scene/scene_file.hpp"
-#include "layout/builder.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
+#include "models/build/builder.hpp"
 #include "scenes.hpp"
 
 namespace linden {

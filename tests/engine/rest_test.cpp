@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "engine/batch.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "scenes.hpp"
 
 namespace linden {

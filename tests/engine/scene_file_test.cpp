@@ -7,9 +7,9 @@
 
 #include "engine/scene/scene_yaml.hpp"
 #include "engine/simulation.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
-#include "models/random.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/random.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/scenes.hpp"
 

@@ -9,8 +9,8 @@
 
 #include "engine/initial_state.hpp"
 #include "engine/simulation.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 namespace linden {
 

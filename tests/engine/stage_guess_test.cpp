@@ -1,9 +1,9 @@
 // What the sub-steps of a composed step begin with.
-#include "engine/step/stage_guess.hpp"
+#include "engine/guess/stage_guess.hpp"
 
 #include <cmath>
 
-#include "engine/step/composition.hpp"
+#include "engine/compose/composition.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {

@@ -7,8 +7,9 @@
 #include "engine/scene/scene_file.hpp"
 #include "engine/simulation.hpp"
 #include "engine/start_check.hpp"
-#include "layout/builder.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
+#include "models/build/builder.hpp"
+#include "models/shapes/contacts_of.hpp"
 #include "tests/engine/command_line.hpp"
 
 namespace linden {

@@ -4,10 +4,10 @@
 #include <set>
 #include <string>
 
-#include "engine/step/effect_plan.hpp"
-#include "engine/step/sweep_cost.hpp"
-#include "engine/step/sweeps.hpp"
-#include "models/generators.hpp"
+#include "engine/effects/effect_plan.hpp"
+#include "engine/sweeps/sweep_cost.hpp"
+#include "engine/sweeps/sweeps.hpp"
+#include "models/build/generators.hpp"
 
 namespace linden {
 namespace {

@@ -6,7 +6,7 @@
 #include "engine/batch.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "layout/effects.hpp"
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/scenes.hpp"
 

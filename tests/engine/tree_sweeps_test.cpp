@@ -1,5 +1,5 @@
 // One large tree, branch by branch.
-#include "engine/step/tree_sweeps.hpp"
+#include "engine/sweeps/tree_sweeps.hpp"
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "kernels/joints.hpp"
+#include "kernels/values/joints.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {

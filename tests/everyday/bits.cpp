@@ -6,7 +6,7 @@
 
 #include "engine/batch.hpp"
 #include "families.hpp"
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace linden {

@@ -15,8 +15,8 @@
 #include "check.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {

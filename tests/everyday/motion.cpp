@@ -6,7 +6,7 @@
 
 #include "engine/batch.hpp"
 #include "families.hpp"
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 
 namespace linden {
 

@@ -8,9 +8,10 @@
 #include <set>
 #include <vector>
 
-#include "layout/builder.hpp"
 #include "layout/contacts.hpp"
-#include "models/random.hpp"
+#include "models/build/builder.hpp"
+#include "models/build/random.hpp"
+#include "models/shapes/contacts_of.hpp"
 #include "tests/reference/plain_scene.hpp"
 
 namespace linden {

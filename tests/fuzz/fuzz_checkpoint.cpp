@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "engine/simulation.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "tests/fuzz/input.hpp"
 
 namespace {

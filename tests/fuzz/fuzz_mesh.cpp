@@ -1,5 +1,5 @@
 // Bytes read as STL, as OBJ and as COLLADA have a finite box each, or are refused; so does the solid that they enclose, if any.
-#include "layout/mesh_solid.hpp"
+#include "models/shapes/mesh_solid.hpp"
 #include "tests/fuzz/input.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

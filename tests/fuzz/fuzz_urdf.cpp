@@ -1,5 +1,5 @@
 // URDF text becomes a sound model with either base, with a density or without, or is refused.
-#include "layout/urdf.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/fuzz/sound_model.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {

@@ -13,7 +13,7 @@
 #include <string>
 #include <string_view>
 
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace linden {

@@ -3,7 +3,7 @@
 #include <cstring>
 
 #include "engine/batch.hpp"
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

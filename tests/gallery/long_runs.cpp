@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "engine/mass_distribution.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/gallery/scenario.hpp"
 
 namespace linden {

@@ -13,8 +13,8 @@
 #include "engine/files/output_file.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/text.hpp"
-#include "layout/input_error.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 #include "tests/gallery/table.hpp"
 
 namespace linden {

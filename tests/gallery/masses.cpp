@@ -1,7 +1,7 @@
 // Masses and inertias of all sizes beside each other.
 #include <cmath>
 
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "layout/builder.hpp"
+#include "models/build/builder.hpp"
 
 namespace linden {
 

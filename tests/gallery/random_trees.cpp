@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "engine/program/progress.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/scenario.hpp"
 
 namespace linden {

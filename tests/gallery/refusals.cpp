@@ -3,7 +3,7 @@
 
 #include "engine/scene/scene.hpp"
 #include "engine/scene/scene_file.hpp"
-#include "layout/input_error.hpp"
+#include "layout/support/input_error.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

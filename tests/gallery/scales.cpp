@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

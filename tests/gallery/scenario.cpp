@@ -6,8 +6,8 @@
 
 #include "engine/program/progress.hpp"
 #include "engine/text.hpp"
-#include "kernels/placement_map.hpp"
-#include "kernels/velocity_down.hpp"
+#include "kernels/tree/placement_map.hpp"
+#include "kernels/tree/velocity_down.hpp"
 
 namespace linden {
 namespace {

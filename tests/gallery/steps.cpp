@@ -4,7 +4,7 @@
 #include <functional>
 #include <numbers>
 
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 #include "tests/reference/closed_forms.hpp"

@@ -1,8 +1,8 @@
-#include "kernels/advance_down.hpp"
+#include "kernels/block/advance_down.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "kernels/innovation_up.hpp"
+#include "kernels/tree/innovation_up.hpp"
 #include "tests/kernels/rig.hpp"
 
 namespace linden {

@@ -1,4 +1,4 @@
-#include "kernels/advance_map.hpp"
+#include "kernels/tree/advance_map.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,8 +1,8 @@
-#include "kernels/articulated_inertia_up.hpp"
+#include "kernels/tree/articulated_inertia_up.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "kernels/velocity_down.hpp"
+#include "kernels/tree/velocity_down.hpp"
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/elimination_plain.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"

@@ -1,4 +1,4 @@
-#include "kernels/articulated.hpp"
+#include "kernels/tree/articulated.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/body_lanes.hpp"
+#include "kernels/values/body_lanes.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/displacement_down.hpp"
+#include "kernels/tree/displacement_down.hpp"
 
 #include <catch2/catch.hpp>
 

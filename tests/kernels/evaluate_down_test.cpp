@@ -1,4 +1,4 @@
-#include "kernels/evaluate_down.hpp"
+#include "kernels/block/evaluate_down.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/gravity.hpp"
+#include "kernels/tree/gravity.hpp"
 
 #include <catch2/catch.hpp>
 

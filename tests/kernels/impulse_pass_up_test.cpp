@@ -1,4 +1,4 @@
-#include "kernels/impulse_pass_up.hpp"
+#include "kernels/tree/impulse_pass_up.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/impulse_up.hpp"
+#include "kernels/tree/impulse_up.hpp"
 
 #include <catch2/catch.hpp>
 

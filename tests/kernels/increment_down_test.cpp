@@ -1,4 +1,4 @@
-#include "kernels/increment_down.hpp"
+#include "kernels/tree/increment_down.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/innovation_up.hpp"
+#include "kernels/tree/innovation_up.hpp"
 
 #include <catch2/catch.hpp>
 #include <limits>

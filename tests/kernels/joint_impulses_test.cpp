@@ -13,8 +13,8 @@
 #include "kernels/effects/spring.hpp"
 #include "kernels/effects/torque.hpp"
 #include "layout/workspace.hpp"
-#include "models/generators.hpp"
-#include "models/random.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 
 namespace linden {

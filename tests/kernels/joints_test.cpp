@@ -1,4 +1,4 @@
-#include "kernels/joints.hpp"
+#include "kernels/values/joints.hpp"
 
 #include <catch2/catch.hpp>
 

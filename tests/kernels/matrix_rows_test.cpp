@@ -1,4 +1,4 @@
-#include "kernels/matrix_rows.hpp"
+#include "kernels/values/matrix_rows.hpp"
 
 #include <catch2/catch.hpp>
 

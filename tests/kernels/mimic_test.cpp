@@ -1,4 +1,4 @@
-#include "kernels/mimic.hpp"
+#include "kernels/tree/mimic.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/momentum_map.hpp"
+#include "kernels/tree/momentum_map.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,8 +1,8 @@
-#include "kernels/momentum_update_map.hpp"
+#include "kernels/tree/momentum_update_map.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "kernels/advance_map.hpp"
+#include "kernels/tree/advance_map.hpp"
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 

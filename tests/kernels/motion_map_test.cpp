@@ -1,4 +1,4 @@
-#include "kernels/motion_map.hpp"
+#include "kernels/tree/motion_map.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "kernels/newton_factor_up.hpp"
+#include "kernels/tree/newton_factor_up.hpp"
 
 #include <catch2/catch.hpp>
 

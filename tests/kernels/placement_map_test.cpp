@@ -1,4 +1,4 @@
-#include "kernels/placement_map.hpp"
+#include "kernels/tree/placement_map.hpp"
 
 #include <catch2/catch.hpp>
 

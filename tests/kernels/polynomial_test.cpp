@@ -1,9 +1,9 @@
-#include "kernels/polynomial.hpp"
+#include "kernels/values/polynomial.hpp"
 
 #include <catch2/catch.hpp>
 #include <numbers>
 
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 #include "tests/reference/se3_plain.hpp"
 

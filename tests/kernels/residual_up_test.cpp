@@ -1,8 +1,8 @@
-#include "kernels/residual_up.hpp"
+#include "kernels/tree/residual_up.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "kernels/gravity.hpp"
+#include "kernels/tree/gravity.hpp"
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/del_literal.hpp"
 #include "tests/reference/discrete_action_plain.hpp"

@@ -1,4 +1,4 @@
-#include "kernels/scalar.hpp"
+#include "kernels/values/scalar.hpp"
 
 #include <catch2/catch.hpp>
 #include <new>

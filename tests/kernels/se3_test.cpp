@@ -1,4 +1,4 @@
-#include "kernels/se3.hpp"
+#include "kernels/values/se3.hpp"
 
 #include <catch2/catch.hpp>
 #include <functional>

@@ -1,9 +1,9 @@
-#include "kernels/sincos.hpp"
+#include "kernels/values/sincos.hpp"
 
 #include <catch2/catch.hpp>
 #include <numbers>
 
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 
 namespace linden {

@@ -1,9 +1,9 @@
-#include "kernels/small_matrix.hpp"
+#include "kernels/values/small_matrix.hpp"
 
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
 
-#include "models/random.hpp"
+#include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 
 namespace linden {

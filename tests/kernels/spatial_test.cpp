@@ -1,4 +1,4 @@
-#include "kernels/spatial.hpp"
+#include "kernels/values/spatial.hpp"
 
 #include <catch2/catch.hpp>
 

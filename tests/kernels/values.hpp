@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "kernels/se3.hpp"
-#include "models/random.hpp"
+#include "kernels/values/se3.hpp"
+#include "models/build/random.hpp"
 #include "tests/reference/se3_plain.hpp"
 
 namespace linden {

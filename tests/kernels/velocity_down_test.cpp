@@ -1,4 +1,4 @@
-#include "kernels/velocity_down.hpp"
+#include "kernels/tree/velocity_down.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -15,10 +15,11 @@
 #include <optional>
 #include <set>
 
-#include "layout/mesh_box.hpp"
-#include "layout/mesh_path.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/shapes/contacts_of.hpp"
+#include "models/shapes/mesh_box.hpp"
+#include "models/shapes/mesh_path.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/engine/folder.hpp"
 #include "tests/layout/robots.hpp"
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <functional>
 
-#include "layout/builder.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/builder.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 using namespace linden;
 using Catch::Matchers::Contains;

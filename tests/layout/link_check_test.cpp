@@ -1,4 +1,4 @@
-#include "layout/link_check.hpp"
+#include "models/build/link_check.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "layout/urdf.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/layout/robots.hpp"
 
 using namespace linden;

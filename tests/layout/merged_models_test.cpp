@@ -1,11 +1,11 @@
-#include "layout/merged_models.hpp"
+#include "models/build/merged_models.hpp"
 
 #include <catch2/catch.hpp>
 #include <numbers>
 
-#include "layout/builder.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
+#include "models/build/builder.hpp"
+#include "models/build/generators.hpp"
+#include "models/urdf/urdf.hpp"
 
 using namespace linden;
 using Catch::Matchers::Contains;

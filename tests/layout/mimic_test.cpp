@@ -3,11 +3,11 @@
 
 #include <catch2/catch.hpp>
 
-#include "layout/builder.hpp"
-#include "layout/dependent_joint.hpp"
-#include "layout/urdf.hpp"
-#include "models/generators.hpp"
-#include "models/random.hpp"
+#include "models/build/builder.hpp"
+#include "models/build/dependent_joint.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/random.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
 using namespace linden;

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "layout/input_error.hpp"
 #include "layout/model.hpp"
-#include "layout/urdf.hpp"
+#include "layout/support/input_error.hpp"
+#include "models/urdf/urdf.hpp"
 
 #ifndef LINDEN_ROBOTS_DIR
 #define LINDEN_ROBOTS_DIR "../shared/robots"

@@ -1,5 +1,5 @@
 // Mass and inertia from shapes and a density: closed forms, solids of meshes, and who gets them.
-#include "layout/shape_mass.hpp"
+#include "models/shapes/shape_mass.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 #include <set>
 
-#include "layout/merged_models.hpp"
-#include "models/generators.hpp"
+#include "models/build/generators.hpp"
+#include "models/build/merged_models.hpp"
 
 namespace linden {
 namespace {

@@ -1,4 +1,4 @@
-#include "layout/urdf.hpp"
+#include "models/urdf/urdf.hpp"
 
 #include <console_bridge/console.h>
 #include <fmt/format.h>

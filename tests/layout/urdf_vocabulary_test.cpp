@@ -1,4 +1,4 @@
-#include "layout/urdf_vocabulary.hpp"
+#include "models/urdf/urdf_vocabulary.hpp"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "layout/input_error.hpp"
-#include "layout/urdf.hpp"
-#include "layout/words.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
+#include "models/urdf/urdf.hpp"
 #include "tests/layout/robots.hpp"
 
 using namespace linden;

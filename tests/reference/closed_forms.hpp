@@ -17,7 +17,7 @@
 #include <numbers>
 #include <span>
 
-#include "layout/builder.hpp"
+#include "models/build/builder.hpp"
 
 namespace linden {
 

@@ -5,10 +5,10 @@
 // Column j is the change of h r when coordinate j of the step's motion varies from the right, M <- M exp(S Delta).
 #pragma once
 
-#include "kernels/displacement_down.hpp"
-#include "kernels/momentum_map.hpp"
-#include "kernels/motion_map.hpp"
-#include "kernels/residual_up.hpp"
+#include "kernels/tree/displacement_down.hpp"
+#include "kernels/tree/momentum_map.hpp"
+#include "kernels/tree/motion_map.hpp"
+#include "kernels/tree/residual_up.hpp"
 #include "layout/workspace.hpp"
 #include "tests/reference/plain_tree.hpp"
 

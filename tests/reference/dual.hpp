@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "kernels/sincos.hpp"
+#include "kernels/values/sincos.hpp"
 
 namespace linden::reference {
 

@@ -1,5 +1,5 @@
 // tests/reference/se3_plain.hpp
-// SE(3) as the paper writes it: 4 x 4 and 6 x 6 matrices, power series, Bernoulli numbers. Truth for kernels/se3.hpp.
+// SE(3) as the paper writes it: 4 x 4 and 6 x 6 matrices, power series, Bernoulli numbers. Truth for kernels/values/se3.hpp.
 //
 //   exp V = sum [V]^j / j!          (5)     every angle; for angles up to pi no digit that counts is lost
 //   dlog_V = sum B_j / j! ad_V^j    (13)    converges like (theta / 2 pi)^j

@@ -1,5 +1,5 @@
 // tests/reference/urdf_plain.hpp
-// A URDF file read as plainly as can be, to judge layout/urdf.cpp by: no urdfdom, no builder, no merging.
+// A URDF file read as plainly as can be, to judge models/urdf/urdf.cpp by: no urdfdom, no builder, no merging.
 //
 // Every link keeps its own frame. Poses are 4 x 4 matrices, multiplied from the link up to the root, each time anew;
 // the mass matrix of the whole at zero is the sum over links of their spatial inertias about the root link's frame.

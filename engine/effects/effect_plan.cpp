@@ -1,0 +1,228 @@
+#include "engine/effects/effect_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "kernels/effects/joint_impulses.hpp"
+#include "kernels/tree/articulated_inertia_up.hpp"
+#include "kernels/tree/increment_down.hpp"
+#include "kernels/tree/mimic.hpp"
+#include "kernels/tree/placement_map.hpp"
+#include "kernels/values/spatial.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+namespace {
+
+constexpr double kUsualGravity = 9.81;
+
+/// Share of the weight of all bodies that a contact point is taken to bear at least, where its friction is made to stick.
+constexpr double kLeastLoad = 1e-2;
+
+/// Speed at which depth that the motion did not make may come to push [m/s].
+constexpr double kRecovery = 1e-3;
+
+/// Share of critical damping from which on little of a bounce is left to lose: its rebound is down to half.
+constexpr double kBouncesLittle = 0.2;
+
+/// Mass that a force on a body is taken to move.
+double moved_mass(const Model& model, Index slot) {
+  const double own = model.constants.inertia(slot, 0);
+  return own > 0 ? own : model.constants.subtree_mass(slot);
+}
+
+/// Mass behind a blow on a body: its own and that of links it hangs on, of these no more than its own.
+double struck_mass(const Model& model, Index slot) {
+  const double own = moved_mass(model, slot);
+  double held = 0;
+  for (Index up = model.tree.parent(slot); up > 0; up = model.tree.parent(up)) held += model.constants.inertia(up, 0);
+  return own + std::min(own, held);
+}
+
+/// Inertia that each joint feels in the zero configuration, all others free: d of the mass matrix, rotors included. A leader feels that of
+/// its coordinate.
+std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>& rotors) {
+  const Tree& tree = model.tree;
+  Workspace<double> work;
+  work.allocate(tree.shape);
+  Field<double> q;
+  q.allocate(tree.shape.positions);
+  std::ranges::copy(model.neutral(), q.flat().begin());
+  placement_map(tree, model.constants, q, work.placement);
+  const Gains<double> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  MimicTies<double> ties(model.mimics, tree);
+  if (ties.empty()) {
+    articulated_inertia_up(tree, model.constants, work.placement, work.articulated, gains);
+  } else {
+    articulated_inertia_up(tree, model.constants, work.placement, work.articulated, gains, ties.held(NothingAdded{}));
+    ties.factor(
+        [&](const Field<double>& r, Field<double>& x) {
+          impulse_pass_up(tree, model.constants, work.placement, gains, r, work.bias, work.innovation);
+          rate_down(tree, model.constants, work.placement, gains, work.innovation, work.variation, x);
+        },
+        [&](Index i) { return tied_load(tree, model.constants, gains, work.bias, work.variation, i); }, work.increment);
+  }
+  const Field<double>& inverse = ties.empty() ? work.joint_inverse : ties.yields(work.joint_inverse);
+  std::vector<double> felt(static_cast<std::size_t>(tree.shape.velocities));
+  for (Index i = 1; i < tree.shape.slots; ++i) {
+    const Index n = velocity_count(tree.kind(i));
+    for (Index k = 0; k < n; ++k) {
+      felt[static_cast<std::size_t>(tree.first_v(i) + k)] = 1 / inverse(tree.first_block(i) + k * n + k);
+    }
+  }
+  for (const Armature& rotor : rotors) felt[static_cast<std::size_t>(rotor.row)] += rotor.inertia;
+  return felt;
+}
+
+std::array<std::array<double, 3>, 3> plane_frame(const std::array<double, 3>& normal) {
+  const Vec3<double> z{normal[0], normal[1], normal[2]};
+  // the plane's x lies in the world's x-z plane where that is possible
+  const Vec3<double> helper = std::abs(z.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0};
+  const Vec3<double> across = helper - dot(helper, z) * z;
+  const Vec3<double> x = (1 / std::sqrt(dot(across, across))) * across;
+  const Vec3<double> y = cross(z, x);
+  return {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, normal}};
+}
+
+/// Of each candidate those on the first feature that is near, on a terrain also those on further ones.
+std::vector<GroundPoint> points_of(const Ground& ground) {
+  std::vector<GroundPoint> points;
+  const int ranks = ground.terrain ? kTerrainRanks : 1;
+  for (const ContactSphere& sphere : ground.contacts.spheres) {
+    for (int rank = 0; rank < ranks; ++rank) {
+      points.push_back({.slot = sphere.slot, .center = sphere.center, .radius = sphere.radius, .axis = sphere.outward, .rank = rank});
+    }
+  }
+  for (const ContactRim& rim : ground.contacts.rims) {
+    for (int rank = 0; rank < ranks; ++rank) {
+      for (int quarter = 0; quarter < (rank == 0 ? 4 : 1); ++quarter) {
+        points.push_back({rim.slot, rim.center, 0, rim.axis, rim.radius, quarter, rank});
+      }
+    }
+  }
+  for (std::size_t k = 0; k < ground.contacts.blocks.size() && ground.terrain; ++k) {
+    const ContactBlock& block = ground.contacts.blocks[k];
+    for (int rank = 0; rank < kBlockRanks; ++rank) {
+      points.push_back({.slot = block.slot, .center = block.center, .radius = block.radius, .rank = rank, .block = static_cast<int>(k)});
+    }
+  }
+  std::ranges::stable_sort(points, {}, &GroundPoint::slot);
+  return points;
+}
+
+}  // namespace
+
+std::optional<StiffContact> stiffest_unresolved(const Model& model, const Options& options, const Effects& effects) {
+  if (!effects.ground) return std::nullopt;
+  const Ground& ground = *effects.ground;
+  Index stiffest = 0;
+  const auto look_at = [&](Index slot) {
+    const double mass = struck_mass(model, slot), damping = 0.5 * ground.damping / std::sqrt(ground.stiffness * mass);
+    const bool resolved = begin_share(options.step * options.step * ground.stiffness / mass) <= 0.5;
+    if (!resolved && damping < kBouncesLittle && (stiffest == 0 || mass < struck_mass(model, stiffest))) stiffest = slot;
+  };
+  for (const ContactSphere& sphere : ground.contacts.spheres) look_at(sphere.slot);
+  for (const ContactRim& rim : ground.contacts.rims) look_at(rim.slot);
+  if (stiffest == 0) return std::nullopt;
+  return StiffContact{model.names.body[static_cast<std::size_t>(stiffest)], struck_mass(model, stiffest)};
+}
+
+EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
+  check(effects, model);
+  const double h = options.step;
+  const Tree& tree = model.tree;
+  std::ranges::stable_sort(effects.drag, {}, &Drag::slot);
+  std::ranges::stable_sort(effects.wrenches, {}, &BodyWrench::slot);
+  if (effects.ground) {
+    ground.ground = *effects.ground;
+    ground.points = points_of(*effects.ground);
+    if (const auto& terrain = effects.ground->terrain) ground.highest = std::ranges::max(terrain->heights);
+  }
+  const std::vector<GroundPoint>& points = ground.points;
+
+  bodies = !effects.drag.empty() || !effects.wrenches.empty() || !points.empty();
+  joints = !effects.armature.empty() || !effects.springs.empty() || !effects.ball_springs.empty() || !effects.damping.empty() ||
+           !effects.friction.empty() || !effects.limits.empty() || !effects.servos.empty() || !effects.torques.empty() || !effects.motions.empty();
+  for (const JointMotion& motion : effects.motions) curves.emplace_back(motion.position, motion.velocities);
+  springs = !effects.springs.empty() || !effects.ball_springs.empty() || !points.empty();
+  balls = !effects.ball_springs.empty() || std::ranges::any_of(effects.damping, [&](const JointDamping& damper) {
+    return std::ranges::none_of(tree.runs, [&](const Run& run) {
+      return run.kind == JointKind::screw && damper.row >= tree.first_v(run.begin) && damper.row <= tree.first_v(run.end - 1);
+    });
+  });
+  bounces = std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return limit.restitution > 0; });
+  revises = !effects.friction.empty() || !effects.limits.empty() || !points.empty() ||
+            std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
+
+  const auto moves = [](const Course& course) { return std::ranges::any_of(course.values, [](double value) { return value != 0; }); };
+  servos_move = std::ranges::any_of(effects.servos, [&](const Servo& servo) {
+    return servo.target_moves() || moves(servo.target_velocity) || moves(servo.feedforward);
+  });
+  if (std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return std::isfinite(limit.velocity); })) {
+    fastest.allocate(tree.shape.velocities, std::numeric_limits<double>::infinity());
+    for (const JointLimit& limit : effects.limits) fastest(limit.row) = limit.velocity;
+  }
+
+  if (joints) {
+    q_row.allocate(tree.shape.velocities, -1);
+    for (Index i = 1; i < tree.shape.slots; ++i) {
+      if (tree.kind(i) == JointKind::screw) q_row(tree.first_v(i)) = tree.first_q(i);
+    }
+  }
+  if (!effects.armature.empty()) {
+    rotor.allocate(tree.shape.velocities);
+    for (const Armature& one : effects.armature) rotor(one.row) += one.inertia;
+  }
+  if (!effects.damping.empty() || !effects.servos.empty()) {
+    const std::vector<double> felt = felt_inertia(model, effects.armature);
+    const auto inertia = [&](Index row) { return felt[static_cast<std::size_t>(row)]; };
+    for (const JointDamping& damper : effects.damping) damping_share.push_back(begin_share(h * damper.coefficient / inertia(damper.row)));
+    for (const Servo& servo : effects.servos) {
+      servo_ratio.push_back((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row));
+      servo_share.push_back(begin_share(servo_ratio.back()));
+    }
+  }
+  const auto mass = [&](Index slot) { return moved_mass(model, slot); };
+  for (const Drag& one : effects.drag) {
+    // a falling body reaches sqrt(m g / b2) at most
+    drag_share.push_back(begin_share(h * (one.linear / mass(one.slot) + std::sqrt(one.quadratic * kUsualGravity / mass(one.slot)))));
+  }
+  if (!points.empty()) {
+    const auto& g = options.gravity;
+    const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    ground.frame = plane_frame(effects.ground->normal);
+    ground.recovery = h * kRecovery;
+    ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
+    for (const GroundPoint& point : points) ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass(point.slot)));
+  }
+
+  bends = revises;
+  for (const std::vector<double>* shares : {&damping_share, &servo_share, &drag_share}) {
+    bends = bends || std::ranges::any_of(*shares, [](double share) { return share > 0.5; });
+  }
+
+  std::map<Index, TouchedBody> by_slot;
+  const auto collect = [&](const auto& list, TouchedBody::Entries TouchedBody::*entries) {
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      TouchedBody& body = by_slot[list[k].slot];
+      body.slot = list[k].slot;
+      if ((body.*entries).last == 0) (body.*entries).first = k;
+      (body.*entries).last = k + 1;
+    }
+  };
+  collect(effects.drag, &TouchedBody::drag);
+  collect(effects.wrenches, &TouchedBody::wrenches);
+  collect(points, &TouchedBody::points);
+  for (const auto& [slot, body] : by_slot) touched.push_back(body);
+}
+
+void EffectPlan::put_positions(double time, std::span<double> q) const {
+  for (std::size_t k = 0; k < curves.size(); ++k) q[static_cast<std::size_t>(q_row(effects.motions[k].row))] = curves[k].at(time);
+}
+
+void EffectPlan::put_velocities(double time, std::span<double> v) const {
+  for (std::size_t k = 0; k < curves.size(); ++k) v[static_cast<std::size_t>(effects.motions[k].row)] = curves[k].slope(time);
+}
+
+}  // namespace linden

@@ -1,0 +1,84 @@
+// engine/effects/effect_plan.hpp
+// The effects of a scene made ready for its steps: sorted by the bodies they touch, with the numbers that do not change. Shared by
+// all steppers; what changes within a step is in engine/effects/effect_sweeps.hpp.
+//
+// An effect that the scene does not name has no entry here, no memory in the sweeps and no call in a step.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "engine/options.hpp"
+#include "kernels/effects/ground_plan.hpp"
+#include "layout/effects.hpp"
+#include "layout/model.hpp"
+#include "layout/smooth_curve.hpp"
+
+namespace linden {
+
+/// Of a velocity that is read: how far it may be from the mean one of the last step where nothing is known of how the motion bends [rad/s, m/s].
+inline constexpr double kAnyBend = 1e36;
+
+/// Entries of every effect on one body: [first, last) of its list.
+struct TouchedBody {
+  struct Entries {
+    std::size_t first = 0, last = 0;
+  };
+  Index slot = 0;
+  Entries drag, wrenches, points;
+};
+
+/// A body that bounces less than its ground is elastic, as the step does not resolve the ground's stiffness under it.
+struct StiffContact {
+  std::string link;
+  double mass;  // that the stiffness was compared with [kg]
+};
+
+/// The lightest such body, where the ground's damping does not take as much anyway.
+std::optional<StiffContact> stiffest_unresolved(const Model& model, const Options& options, const Effects& effects);
+
+struct EffectPlan {
+  /// Throws InputError for effects that make no sense for the model.
+  EffectPlan(const Model& model, const Options& options, const Effects& effects);
+
+  Effects effects;
+  bool joints = false;   // some effect acts on joints
+  bool bodies = false;   // on bodies
+  bool springs = false;  // some potential beside gravity's
+  bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
+  bool bounces = false;  // some limit has a restitution
+  std::vector<SmoothCurve> curves;  // of every given motion
+  bool servos_move = false;  // some servo has a table
+  bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
+  bool bends = false;    // velocities are held to how the motion bends (velocity.md): something revises, or acts more at the beginning of a step
+  bool any() const { return joints || bodies; }
+
+  Field<Index> q_row;               // position row of a screw's velocity row
+  std::vector<double> damping_share, servo_share, drag_share;
+  std::vector<double> servo_ratio;  // of which servo_share is the begin_share: it goes with the gains
+  Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
+  Field<double> rotor;              // armature of every row; no rows without armature
+  GroundPlan ground;                // no points without ground
+  /// Joints whose motion is given are where it is at a time [s], whatever stands in q [nq], and as fast as it goes on from there.
+  void put_positions(double time, std::span<double> q) const;
+  void put_velocities(double time, std::span<double> v) const;
+  /// Numbers beside those of rows that are kept from step to step (EffectSweeps::kept).
+  Index kept() const { return ground.kept() + 3 * static_cast<Index>(curves.size()); }
+  std::vector<TouchedBody> touched;  // sorted by slot
+};
+
+/// action(std::true_type) where there is any effect, else action(std::false_type). What steps is compiled for each apart, so that a step
+/// without effects is the same to the last instruction whether there are any elsewhere or not; bench/pay_as_you_go counts them beside those
+/// of a linden that has none.
+template <class Action>
+auto with_or_without([[maybe_unused]] const EffectPlan& plan, const Action& action) {
+#ifndef LINDEN_WITHOUT_EFFECTS
+  if (plan.any()) return action(std::true_type{});
+#endif
+  return action(std::false_type{});
+}
+
+}  // namespace linden

@@ -1,0 +1,80 @@
+// engine/effects/impulse_account.hpp
+// The impulses of effects in a part of a step, read off the solution before the part is ended.
+//
+//   joints    J = -(o + g delta) / h of both ends of the step (joint_impulses.hpp); of held joints also what is left of the residual, / h
+//   bodies    J = S^T F, F the wrenches of wrenches, drag and ground summed over subtrees (body_impulses.hpp)
+//   servos    of each alone, as its law and its limit have it (servo.hpp)
+//   ground    h N of each contact point (ground.hpp)
+//
+// cost    one pass up the tree where something acts on bodies
+#pragma once
+
+#include <limits>
+
+#include "engine/effects/effect_sweeps.hpp"
+#include "engine/effects/step_impulses.hpp"
+#include "kernels/tree/impulse_up.hpp"
+#include "layout/model.hpp"
+
+namespace linden {
+
+class ImpulseAccount {
+ public:
+  /// Until then nothing is kept.
+  void allocate(const EffectPlan& plan, const Shape& shape) {
+    sum_.joints.assign(static_cast<std::size_t>(shape.velocities), 0);
+    sum_.servos.assign(plan.effects.servos.size(), 0);
+    sum_.ground.assign(plan.ground.points.size(), 0);
+    sum_.closed.assign(plan.ground.points.size(), 0);
+    projected_.allocate(shape.velocities);
+    end_.allocate(shape.velocities);
+    wrench_.allocate(shape.slots);
+  }
+  bool kept() const { return projected_.rows() > 0; }
+  void clear() { sum_.clear(); }
+  const StepImpulses& sum() const { return sum_; }
+
+  /// A part of h seconds: q and placement at its beginning, motion and delta over it; residual: what is left of it.
+  void add(const EffectSweeps<double>& effects, const Model& model, double h, const Field<double>& q, const Field<double, 12>& placement,
+           const Field<double, 7>& motion, const Field<double>& delta, const Field<double>& residual) {
+    const EffectPlan& plan = effects.plan();
+    const double rate = 1 / h;
+    if (plan.joints) {
+      const JointImpulses<double>& given = effects.joint_sum();
+      for (Index row = 0; row < projected_.rows(); ++row) {
+        const bool held = given.stiffness(row) > std::numeric_limits<double>::max();
+        projected_(row) = given.end_offset(row) - given.offset(row) + (given.end_gain(row) - given.gain(row)) * delta(row) +
+                          (held ? residual(row) : 0);
+        end_(row) = 0;
+      }
+      ball_spring_map(plan.effects.ball_springs, model.tree, h, q, motion, projected_);
+      ball_spring_end_map(plan.effects.ball_springs, model.tree, h, q, motion, end_);
+      for (Index row = 0; row < projected_.rows(); ++row) sum_.joints[static_cast<std::size_t>(row)] += rate * projected_(row) + end_(row);
+      const Servos<double>& servos = effects.servos();
+      for (std::size_t k = 0; k < sum_.servos.size(); ++k) {
+        const auto [o, g, most] = servo_law(servos, static_cast<Index>(k), plan.q_row, h, q);
+        const double mode = servos.mode(static_cast<Index>(k));
+        sum_.servos[k] += rate * (mode == 0 ? -(o + g * delta(servos.entries[k].row)) : mode * most);
+      }
+    }
+    if (!plan.bodies) return;
+    std::ranges::copy(effects.body_sum().given.flat(), wrench_.flat().begin());
+    impulse_up(model.tree, model.constants, placement, wrench_, projected_);
+    for (Index row = 0; row < projected_.rows(); ++row) sum_.joints[static_cast<std::size_t>(row)] += rate * projected_(row);
+    const GroundPoints<double>& points = effects.points();
+    for (std::size_t k = 0; k < sum_.ground.size(); ++k) {
+      sum_.ground[k] += h * points.push(static_cast<Index>(k));
+      sum_.closed[k] = points.closed(static_cast<Index>(k)) > 0.5 ? 1 : 0;
+    }
+  }
+
+ private:
+  StepImpulses sum_;
+  Field<double> projected_, end_;
+  Field<double, 6> wrench_;
+};
+
+/// Where there are no effects.
+struct NoImpulses {};
+
+}  // namespace linden

@@ -1,0 +1,100 @@
+// engine/solve/block_stepper.hpp
+// What steps a block of W instances of one tree, W the lanes of a register: an interface, since which registers there are is known only
+// when the program starts. engine/solve/lane_stepper.hpp implements it, compiled once for each set of instructions.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "engine/effects/effect_plan.hpp"
+#include "engine/options.hpp"
+#include "engine/step_report.hpp"
+#include "layout/model.hpp"
+
+namespace linden {
+
+/// Lanes of double precision; of single precision twice as many, but for one.
+enum class Instructions : std::uint8_t {
+  scalar,    // 1: no vector instructions
+  baseline,  // 2: SSE2, NEON
+  avx2,      // 4: AVX2 and FMA
+  avx512,    // 8
+};
+
+/// The best that this processor has and linden was compiled for.
+Instructions best_instructions();
+bool available(Instructions instructions);
+std::string_view name(Instructions instructions);
+/// Throws InputError naming the choices where `text` is none of them.
+Instructions instructions_from(const std::string& text);
+/// Instances of a block.
+template <class Real>
+int lanes_of(Instructions instructions);
+
+/// How an instance is doing, and what its steps cost.
+struct InstanceRecord {
+  StepStatus status = StepStatus::converged;  // of the last step; an instance that fails is frozen at its last good state
+  std::int8_t displacements = 0;              // how many earlier displacements the first guess may use
+  Index slot = 0;                             // where a frozen instance failed: body or joint; 0 = fine
+  std::int32_t rescued = 0;                   // steps taken alone: backtracked or split, as a Simulation would
+  std::int64_t steps = 0;                     // since the start or the last reset
+  std::int64_t evaluations = 0;               // of the residual, likewise
+  double residual = 0;                        // relative, of a frozen instance's failed step
+  bool operator==(const InstanceRecord&) const = default;
+};
+
+/// Where the W instances of a block lie. Rows are [row][lane].
+template <class Real>
+struct Block {
+  Real* q;                    // [nq]
+  Real* p;                    // [nv]
+  std::uint32_t* past;        // layout/packed_history.hpp
+  const Real* applied;        // [nv] forces given from outside; null: none
+  const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
+  const Real* targets;        // [servos] targets of each instance, NaN: of the plan's table; null: the plan's
+  const Real* frictions;      // [frictions] forces of each instance; null: the plan's
+  const Real* gains;          // [servos] factors of stiffness and damping of each instance; null: 1
+  const Real* ground_friction;  // Coulomb's coefficient of each instance; null: the plan's
+  Real* excess_before;        // [nv] see EffectMemory; null: no effects
+  Real* reading;              // [nv] likewise
+  Real* bend;                 // [nv] likewise
+  Real* kept;                 // [EffectPlan::kept] (EffectSweeps::kept); null: none
+  InstanceRecord* instances;  // [W]
+  int count;                  // instances in use, 1 to W
+};
+
+template <class Real>
+class BlockStepper {
+ public:
+  virtual ~BlockStepper() = default;
+  virtual int lanes() const = 0;
+
+  /// `steps` steps of every instance that is not frozen.
+  virtual void step(const Block<Real>& block, std::int64_t steps) = 0;
+
+  /// velocities [nv] and energy [2] (kinetic, potential [J]) of every instance, rows [row][lane].
+  virtual void observe(const Block<Real>& block, Real* velocities, Real* energy) = 0;
+};
+
+/// The model's constants in the precision of the lanes, and how to step. Both must outlive the steppers.
+template <class Real>
+struct BlockSetup {
+  const Model& model;
+  const BodyConstants<Real>& constants;
+  const Options& options;
+  bool own_masses;  // Block::mass is given
+  const EffectPlan& plan;  // beside gravity
+};
+
+/// kEffects: with those of the plan.
+template <Instructions, bool kEffects>
+std::unique_ptr<BlockStepper<double>> make_block_stepper(const BlockSetup<double>& setup);
+template <Instructions, bool kEffects>
+std::unique_ptr<BlockStepper<float>> make_block_stepper(const BlockSetup<float>& setup);
+
+/// Of single precision nothing better can be asked: rounding leaves about so much of the residual.
+inline constexpr double kSingleTolerance = 3e-6;
+
+}  // namespace linden

@@ -1,0 +1,62 @@
+// engine/solve/instance_stepper.hpp
+// One instance of a block on its own, in double precision: its start, and the steps that a block cannot take because they need
+// backtracking or splitting.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "engine/solve/stepper.hpp"
+
+namespace linden {
+
+class InstanceStepper {
+ public:
+  InstanceStepper(const Model& model, const Options& options, const EffectPlan& plan);
+  // not inline: compiled for every processor, where those that use it are compiled for one
+  ~InstanceStepper();
+
+  State<double>& state() { return state_; }
+
+  /// Inertia of every body [slots x 10]; subtree masses follow.
+  BodyConstants<double>& own_constants();
+  /// Generalized forces [nv] to be written; from the first call on they count.
+  std::span<double> applied();
+
+  /// Before all else of an instance: nothing is left of the one before it.
+  void forget();
+  /// What effects keep of the step before, to be written, and of the step taken, to be read; see Stepper.
+  EffectMemory effect_memory() { return stepper_->effect_memory(); }
+  double kept(Index k) const { return stepper_->kept(k); }
+  void set_kept(Index k, double number) { stepper_->set_kept(k, number); }
+  /// Targets of the plan's servos, to be written.
+  std::span<double> servo_targets() { return stepper_->servo_targets(); }
+  std::span<double> friction_forces() { return stepper_->friction_forces(); }
+  void set_gain(Index k, double factor) { stepper_->set_gain(k, factor); }
+  void set_ground_friction(double coefficient) { stepper_->set_ground_friction(coefficient); }
+
+  /// One step of the state, from `time` on. The latest row of state().history and state().last_step say what is known of the step before.
+  StepReport step(double time);
+  /// p = M(q) v.
+  void set_velocities(std::span<const double> v);
+  /// Energy; and rate() is the velocity that is read.
+  Energy observe();
+  const Field<double>& rate() const { return rate_; }
+
+ private:
+  void refresh();
+
+  const Model& model_;
+  Options options_;
+  std::unique_ptr<Stepper> stepper_;
+  State<double> state_;
+  Field<double> rate_;
+  BodyConstants<double> constants_;  // empty where the model's are meant
+  std::vector<double> applied_;      // empty where there are none
+};
+
+/// Quaternions of ball and free joints to unit length, followers of mimic joints to their leaders. Throws InputError for a position that
+/// is not finite or a quaternion of length zero.
+void normalise_positions(const Model& model, std::span<double> q);
+
+}  // namespace linden

@@ -1,0 +1,94 @@
+// engine/solve/stepper.hpp
+// The one-step map (q, p) -> (q, p) of one instance: solve the discrete Euler-Lagrange equation for the displacement, then read off the
+// new momentum. tree_stepper.hpp says how.
+//
+// Symplectic, time-symmetric, second order; no allocation. A solve that makes no progress is backtracked, then given a fresh exact
+// Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/effects/effect_plan.hpp"
+#include "engine/effects/effect_work.hpp"
+#include "engine/effects/step_impulses.hpp"
+#include "engine/options.hpp"
+#include "engine/step_report.hpp"
+#include "kernels/values/spatial.hpp"
+#include "layout/state.hpp"
+
+namespace linden {
+
+struct Energy {
+  double kinetic = 0;    // 1/2 p.M^-1 p [J]
+  double potential = 0;  // of gravity (zero where the centre of mass is at the height of the world's origin), springs and ground [J]
+  double springs = 0, ground = 0;  // their shares of it
+  double total() const { return kinetic + potential; }
+  double gravity() const { return potential - springs - ground; }
+};
+
+/// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading).
+struct EffectMemory {
+  std::span<double> excess_before, reading, bend;
+};
+
+class Stepper {
+ public:
+  virtual ~Stepper();
+
+  /// Brings placements and forces to the positions in `state`; call after any change of them from outside.
+  virtual void refresh(const State<double>& state) = 0;
+  /// Generalized forces [nv] on top of gravity, the same until they are set anew; followed by a refresh. Empty: none.
+  virtual void apply(std::span<const double> force) = 0;
+  /// Masses and inertias of an instance that differs from the model, followed by a refresh. They must live as long as they are used.
+  virtual void use(const BodyConstants<double>& constants) = 0;
+  /// The state is another's from now on, or was changed: nothing is known of a step before.
+  virtual void forget() = 0;
+
+  /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
+  /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
+  /// another: a step of the same h follows before anything else is asked of the stepper or the state, which may then be left for that step
+  /// to complete. A step that fails leaves the state complete, as it was at its beginning.
+  virtual StepReport step(State<double>& state, int& history, double time, double h, bool another) = 0;
+  /// Of effects, in the step taken last.
+  virtual const EffectAccount& effect_account() const = 0;
+
+  /// From now on the impulses of effects in a step are kept, as those of the step taken last; without effects there are none.
+  virtual void keep_impulses() = 0;
+  virtual const StepImpulses& impulses() const = 0;
+
+  /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; NaN: that of the servo's table. Empty
+  /// without servos.
+  virtual std::span<double> servo_targets() = 0;
+  /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
+  virtual std::span<double> friction_forces() = 0;
+  /// Factor of the stiffness and damping of servo k; Coulomb's coefficient of the ground. Likewise.
+  virtual void set_gain(Index k, double factor) = 0;
+  virtual void set_ground_friction(double coefficient) = 0;
+  /// What effects keep of the step taken last; written where it is that of another state. Empty without effects.
+  virtual EffectMemory effect_memory() = 0;
+  /// Number k of EffectSweeps::kept, likewise.
+  virtual double kept(Index k) const = 0;
+  virtual void set_kept(Index k, double number) = 0;
+  /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
+  virtual std::vector<std::span<double>> memory() = 0;
+
+  /// The velocity of the motion at the positions of the last refresh or step, see engine/VELOCITY.md: M(q)^-1 p where nothing acts
+  /// but potentials; else p is read with the effects' impulses taken half at each end of the last step, what they hold is at rest, and no
+  /// velocity is farther from the mean one of that step than the motion bends.
+  virtual void read_velocity(const State<double>& state, Field<double>& v) = 0;
+  /// p = M(q) v.
+  virtual void momentum_of(const Field<double>& v, Field<double>& p) = 0;
+  /// Momentum of the whole system about the world's origin, in the world's frame, as its energy is. rate: scratch.
+  virtual Wrench<double> total_momentum(const State<double>& state, Field<double>& rate) = 0;
+  /// Of a state with the positions of the last refresh or step; rate: its velocity. The kinetic energy is that of p and of M^-1 p as they
+  /// are read, which the works of effects go with.
+  virtual Energy energy_of(const State<double>& state, Field<double>& rate) = 0;
+};
+
+/// With the effects of the plan, where it has any. Model and plan must outlive the stepper. Throws InputError for options that make no
+/// sense.
+std::unique_ptr<Stepper> make_stepper(const Model& model, const Options& options, const EffectPlan& plan);
+
+}  // namespace linden

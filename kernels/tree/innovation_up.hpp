@@ -1,0 +1,164 @@
+// kernels/tree/innovation_up.hpp
+// The upward half of an evaluation and of a solve in one sweep. Of a block of instances: lane = instance; of one tree: lane = body, where
+// a level has screws enough.
+//
+//   E_i = h mu_i + sum over children c of Ad_{X_c^-1}^T (E_c - gain_up_c u_c),    u_i = S_i^T E_i - h (p + h/2 Q)_i
+//
+// Impulses F of the residual and impulses b of joints that yield (residual_up, impulse_pass_up) travel by the same road, so their
+// difference E = F - b does, at half the cost. Where the residual vanishes E is F; what is left of u is handed on as r is
+// (momentum_update_map): the momentum of the whole tree stays exact.
+//
+//   innovation_up       with the gains there are
+//   newton_up           factors the Jacobian on the way (newton_factor_up): FirstOrder with K to first order, or with the exact K
+//
+// reads   screw 2 x n, inertia 10 x n, placement 12 x n, motion 7 x n, turn 3 x n or displacement 7 x n, momentum_target nv, impulse 6 x n
+//         holding h mu, (gains)
+// writes  impulse 6 x n (E), innovation nv (u), (articulated 36 x n: the children's share of Pi; gains)
+// returns sum of |u.(d^-1 u)|, the squared energy norm of the residual (see impulse_pass_up)
+// source  the paper, Algorithm 2, lines 8 and 9; Featherstone, Rigid Body Dynamics Algorithms, 7.3
+#pragma once
+
+#include "kernels/block/evaluate_down.hpp"
+#include "kernels/tree/impulse_pass_up.hpp"
+#include "kernels/tree/newton_factor_up.hpp"
+#include "kernels/values/body_lanes.hpp"
+
+namespace linden {
+
+/// The world has no momentum of its own.
+template <class S>
+void clear_world(Field<S, 6>& impulse) {
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  store(impulse, 0, Wrench<S>{zero, zero});
+}
+
+/// What travels up, on its way: to a parent that comes next in registers, to others through memory.
+template <class S>
+class Climbing {
+ public:
+  Climbing(Field<S, 6>& impulse, Slots slots) : impulse_(impulse), slots_(slots) {
+    const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+    none_ = waiting_ = {zero, zero};
+  }
+  /// The body's own impulse and all that its children passed.
+  LINDEN_INLINE Wrench<S> arrived(Index i) {
+    const Index row = slots_.row(i);
+    const Wrench<S> sum = load<Wrench, S>(impulse_, row) + waiting_;
+    store(impulse_, row, sum);
+    return sum;
+  }
+  /// Bodies up to i are next, several at once: all that goes up is to be in memory.
+  LINDEN_INLINE void unload(Index i) {
+    const Index row = slots_.row(i);
+    store(impulse_, row, load<Wrench, S>(impulse_, row) + waiting_);
+    waiting_ = none_;
+  }
+  LINDEN_INLINE void pass(const Tree& tree, Index i, const Wrench<S>& passed) {
+    const Index parent = tree.parent(i);
+    if (parent == i - 1 && i > slots_.begin) {
+      waiting_ = passed;
+    } else {
+      waiting_ = none_;
+      const Index row = slots_.row_of_parent(parent);
+      store(impulse_, row, load<Wrench, S>(impulse_, row) + passed);
+    }
+  }
+
+ private:
+  Field<S, 6>& impulse_;
+  Slots slots_;
+  Wrench<S> none_, waiting_;
+};
+
+/// slots: all, or parts of a large tree in the order of Tree: whatever hangs in other parts has been met before.
+template <class S, class Element>
+[[gnu::noinline]] S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Slots slots, Workspace<S>& work) {
+  const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  if (slots.end == tree.shape.slots) clear_world(work.impulse);
+  Climbing<S> climbing(work.impulse, slots);
+  S norm(0.0);
+  const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    for (Index i = part.end - 1; i >= part.begin; --i) {
+      const Index row = tree.first_v(i);
+      const Wrench<S> E = climbing.arrived(i);
+      const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
+      store_joint(joint, work.innovation, row, u);
+      const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
+      climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, slots.row(i)), passed));
+    }
+  };
+  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+    if constexpr (joint == JointKind::screw && std::is_same_v<S, double>) {
+      const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
+        using std::abs;
+        climbing.unload(i + kBodies - 1);
+        const Index row = tree.first_v(i);
+        const auto E = gather<Wrench>(bodies, work.impulse, slots.row(i));
+        const auto screw = gather<Screw>(bodies, constants.screw, i);
+        const auto u = screw.r * E.n.z + screw.t * E.f.z - gather_row(bodies, work.momentum_target, row);
+        scatter_row(bodies, work.innovation, row, u);
+        norm = norm + summed(bodies, abs(u * gather_row(bodies, gains.inverse, tree.first_block(i)) * u));
+        const auto passed = E - u * gather<Wrench>(bodies, gains.up, row);
+        add_at(bodies, work.impulse, rows_of_parents(tree, slots, i).data(), to_parent(gather<Placement>(bodies, work.placement, slots.row(i)), passed));
+      };
+      for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+    } else {
+      one_by_one(joint, part);
+    }
+  });
+  return norm;
+}
+
+template <class S, class Element>
+S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
+  return innovation_up(tree, constants, all_slots(tree), work);
+}
+
+template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
+[[gnu::noinline]] S newton_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work, const Added& added = {}) {
+  const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
+  clear_world(work.impulse);
+  S norm(0.0);
+  up(tree, [&](auto joint, Index i) {
+    const Index row = tree.first_v(i), parent = tree.parent(i);
+    const auto G = load<Inertia, S>(constants.inertia, i);
+    Mat6<S> A;
+    if constexpr (FirstOrder) {
+      A = pose_derivative_first_order(G, load<Vec3, S>(work.turn, i));
+    } else {
+      const Twist<S> twist = log(load<Displacement, S>(work.displacement, i));
+      A = pose_derivative(G, twist, G * twist);
+    }
+    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.pull.row(i));
+    if (tree.is_leaf(i) == 0) A = A + Mat6<S>::from(work.articulated.row(i));
+    A.to(work.articulated.row(i));
+    settle();
+    S felt[36];
+    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt, added);
+    settle();
+
+    const auto X = load<Placement, S>(work.placement, i);
+    S* const above = work.articulated.row(parent);
+    if constexpr (joint != JointKind::free) {
+      const auto X_pose = after_motion(joint, X, load_motion(joint, work.motion, i));
+      if (tree.is_last_child(i) != 0) {
+        to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = value; });
+      } else {
+        to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = above[at] + value; });
+      }
+    } else if (tree.is_last_child(i) != 0) {
+      for (int k = 0; k < 36; ++k) above[k] = S(0.0);
+    }
+    settle();
+
+    const auto E = load<Wrench, S>(work.impulse, i);
+    const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
+    store_joint(joint, work.innovation, row, u);
+    const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
+    // through memory: six registers more to hold would cost more than they spare
+    store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(X, passed));
+  });
+  return norm;
+}
+
+}  // namespace linden
