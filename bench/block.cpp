@@ -90,9 +90,10 @@ struct Bench {
     work.delta = delta;
     const auto none = h < S(0.0);
     motion_map(tree, constants, work.delta, work.motion);
-    advance_down<true>(tree, constants, gravity(), none, work, state.q);
+    const Vec3<S> g = gravity();
+    advance_down(tree, constants, &g, none, work, state.q);
     const Field<S>* const nothing = nullptr;
-    momentum_up<true>(tree, constants, h, none, nothing, work, state.p);
+    momentum_up(tree, constants, true, h, none, nothing, work, state.p);
     // the momentum that makes this displacement nearly the solution
     start_down(tree, constants, work);
     impulse_up(tree, constants, work.placement, work.impulse, work.momentum_target);
@@ -106,10 +107,13 @@ struct Bench {
   void factor_exactly() { newton_up<false>(model.tree, constants, work); }
   void correct() { correct_down(model.tree, constants, h > S(0.0), work); }
   void check() { innovation_up(model.tree, constants, work); }
-  void advance() { advance_down<true>(model.tree, constants, gravity(), h < S(0.0), work, state.q); }
+  void advance() {
+    const Vec3<S> g = gravity();
+    advance_down(model.tree, constants, &g, h < S(0.0), work, state.q);
+  }
   void momentum() {
     const Field<S>* const nothing = nullptr;
-    momentum_up<true>(model.tree, constants, h, h < S(0.0), nothing, work, state.p);
+    momentum_up(model.tree, constants, true, h, h < S(0.0), nothing, work, state.p);
   }
 };
 

@@ -20,8 +20,6 @@
 namespace linden {
 namespace {
 
-constexpr Index kMassRows = 11;  // a slot: inertia, subtree mass
-
 void check_batch(std::int64_t size, const BatchOptions& options) {
   check(options);
   constexpr std::int64_t most = 1'000'000'000;
@@ -140,27 +138,28 @@ struct BatchOf<Real>::Data {
 
   Block<Real> block(std::int64_t b) {
     const Index nv = shape().velocities;
-    return {q.data() + at(b, shape().positions),
-            p.data() + at(b, nv),
-            past.data() + at(b, nv * kHistoryWords<Real>),
-            applied.empty() ? nullptr : applied.data() + at(b, nv),
-            mass.empty() ? nullptr : mass.data() + at(b, shape().slots * kMassRows),
-            targets.empty() ? nullptr : targets.data() + at(b, count_of(plan.effects.servos)),
-            frictions.empty() ? nullptr : frictions.data() + at(b, count_of(plan.effects.friction)),
-            gains.empty() ? nullptr : gains.data() + at(b, count_of(plan.effects.servos)),
-            ground_friction.empty() ? nullptr : ground_friction.data() + at(b, 1),
-            excess_before.empty() ? nullptr : excess_before.data() + at(b, nv),
-            reading.empty() ? nullptr : reading.data() + at(b, nv),
-            bend.empty() ? nullptr : bend.data() + at(b, nv),
-            kept.empty() ? nullptr : kept.data() + at(b, plan.kept()),
-            records.data() + b * lanes,
-            static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
+    const auto rows_of = [&](auto& numbers, Index count) { return numbers.empty() ? nullptr : numbers.data() + at(b, count); };
+    return {.q = rows_of(q, shape().positions),
+            .p = rows_of(p, nv),
+            .past = rows_of(past, nv * kHistoryWords<Real>),
+            .applied = rows_of(applied, nv),
+            .mass = rows_of(mass, shape().slots * kMassRows),
+            .targets = rows_of(targets, count_of(plan.effects.servos)),
+            .frictions = rows_of(frictions, count_of(plan.effects.friction)),
+            .gains = rows_of(gains, count_of(plan.effects.servos)),
+            .ground_friction = rows_of(ground_friction, 1),
+            .excess_before = rows_of(excess_before, nv),
+            .reading = rows_of(reading, nv),
+            .bend = rows_of(bend, nv),
+            .kept = rows_of(kept, plan.kept()),
+            .instances = records.data() + b * lanes,
+            .count = static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
   }
 
   Worker& worker() const {
     Worker& mine = workers.local();
     if (!mine.block) {
-      mine.block = make<Real>(instructions, {*model, constants, options, !mass.empty(), plan});
+      mine.block = make<Real>(instructions, {*model, constants, options, plan});
       mine.instance = std::make_unique<InstanceStepper>(*model, options, plan);
     }
     return mine;
@@ -364,7 +363,6 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
         }
       }
     });
-    data_->workers.clear();  // theirs share the model's masses
   }
   const double more = m - static_cast<double>(data_->mass_row(i, slot)[0]);
   for (std::size_t k = 0; k < 10; ++k) data_->mass_row(i, slot)[k * static_cast<std::size_t>(lanes())] = static_cast<Real>(inertia[k]);

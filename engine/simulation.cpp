@@ -111,7 +111,7 @@ void Simulation::set_forces(std::span<const double> force) {
 }
 
 void Simulation::set_servo_targets(std::span<const double> targets) {
-  const std::span<double> to = stepper_->servo_targets();
+  const std::span<double> to = stepper_->controls().servo_targets();
   check_row_count("servo targets", targets.size(), static_cast<Index>(to.size()));
   for (std::size_t k = 0; k < targets.size(); ++k) {
     const bool by_table = std::isnan(targets[k]) && plan_->effects.servos[k].target_moves();
@@ -132,11 +132,11 @@ void require_not_negative(const std::string& what, double number) {
 void Simulation::set_gains(std::span<const double> factors) {
   check_row_count("factors of gains", factors.size(), static_cast<Index>(plan_->effects.servos.size()));
   for (std::size_t k = 0; k < factors.size(); ++k) require_not_negative(fmt::format("factor of the gains of servo {}", k), factors[k]);
-  for (std::size_t k = 0; k < factors.size(); ++k) stepper_->set_gain(static_cast<Index>(k), factors[k]);
+  for (std::size_t k = 0; k < factors.size(); ++k) stepper_->controls().set_gain(static_cast<Index>(k), factors[k]);
 }
 
 void Simulation::set_friction(std::span<const double> forces) {
-  const std::span<double> to = stepper_->friction_forces();
+  const std::span<double> to = stepper_->controls().friction_forces();
   check_row_count("forces of friction", forces.size(), static_cast<Index>(to.size()));
   for (std::size_t k = 0; k < forces.size(); ++k) require_not_negative(fmt::format("force of friction {}", k), forces[k]);
   std::ranges::copy(forces, to.begin());
@@ -147,13 +147,13 @@ void Simulation::set_ground_friction(double coefficient) {
     throw InputError("the friction of the ground was set and there is no ground; expected one among the effects; name it there");
   }
   require_not_negative("friction of the ground", coefficient);
-  stepper_->set_ground_friction(coefficient);
+  stepper_->controls().set_ground_friction(coefficient);
 }
 
 std::vector<double> Simulation::motion_forces() const {
   std::vector<double> forces;
   const auto count = static_cast<Index>(plan_->curves.size());
-  for (Index k = plan_->kept() - count; k < plan_->kept(); ++k) forces.push_back(stepper_->kept(k));
+  for (Index k = plan_->kept() - count; k < plan_->kept(); ++k) forces.push_back(stepper_->controls().kept(k));
   return forces;
 }
 
@@ -172,16 +172,16 @@ void Simulation::set_wrench(Index slot, const std::array<double, 3>& force, cons
   wrench->moment = moment;
 }
 
-StepReport Simulation::step() { return take_step(false); }
+StepReport Simulation::step() { return take_step(Then::stop); }
 
 StepsReport Simulation::run(std::int64_t steps) {
   StepsReport report;
-  while (report.steps < steps && report.ok()) report.add(take_step(report.steps + 1 < steps));
+  while (report.steps < steps && report.ok()) report.add(take_step(report.steps + 1 < steps ? Then::step : Then::stop));
   return report;
 }
 
-StepReport Simulation::take_step(bool another) {
-  const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, another);
+StepReport Simulation::take_step(Then then) {
+  const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, then);
   if (report.ok()) {
     ++steps_;
     if (impulses_ && !stage_guess_) *impulses_ = stepper_->impulses();
@@ -200,7 +200,7 @@ StepReport Simulation::step_in_stages() {
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const bool known = extrapolates ? stage_guess_->predict(i, state_.history) : stage_guess_->repeat(i, state_.history);
     history_ = known ? 1 : 0;
-    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step, false);
+    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step, Then::stop);
     whole.add(report);
     if (report.ok()) {
       if (impulses_) {

@@ -129,7 +129,7 @@ class Simulation {
   std::vector<double> mean_forces(const std::vector<double>& impulses) const;
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
-  StepReport take_step(bool another);
+  StepReport take_step(Then then);
   StepReport step_in_stages();
 
   std::shared_ptr<const Model> model_;

@@ -19,6 +19,9 @@ struct BodyConstants {
   LINDEN_FIELDS(LINDEN_BODY_CONSTANTS_FIELDS)
 };
 
+/// Rows of the masses of one body where instances have their own: inertia, subtree_mass.
+inline constexpr Index kMassRows = 11;
+
 /// subtree_mass from the masses of the bodies.
 template <class Constants>
 void sum_subtree_masses(const Tree& tree, Constants& constants) {

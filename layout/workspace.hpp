@@ -35,6 +35,9 @@ inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
   FIELD(Scalar, innovation, 1, velocities, "u = r - S^T b")                                                            \
   FIELD(Scalar, increment, 1, velocities, "Delta: the correction of the displacement [rad, m]")                        \
   FIELD(Scalar, applied, 1, velocities, "the correction applied last [rad, m]")                                        \
+  FIELD(Scalar, end_momentum, 1, velocities, "h p at the end of the step, but for its forces [kg m^2, kg m]")          \
+  FIELD(Scalar, end_impulse, 1, velocities, "what effects of joints add to p at the end of the step")                  \
+  FIELD(Scalar, momentum, 1, velocities, "M v, or h p of a displacement, of whoever asks")                              \
   FIELD(Scalar, delta, 1, velocities, "delta: displacement of the joints, first guess and then better [rad, m]")                     \
   FIELD(Scalar, force, 1, velocities, "Q: generalized force of the potentials at q [N m, N]")                          \
   FIELD(Scalar, field, 3, slots, "gravity in the body frame [m/s^2]")                                                  \

@@ -18,6 +18,7 @@
 #include "engine/effects/effect_plan.hpp"
 #include "engine/effects/effect_work.hpp"
 #include "engine/effects/lane_times.hpp"
+#include "engine/effects/revision.hpp"
 #include "kernels/effects/armature.hpp"
 #include "kernels/effects/ball_spring.hpp"
 #include "kernels/effects/damping.hpp"
@@ -47,20 +48,13 @@ inline constexpr double kMostBend = 1.5;
 /// Where within a step the velocity of a given motion is that with which it comes to the end: but for the rounding of times, there.
 inline constexpr double kComing = 1 - 1e-6;
 
-/// How far a solve is when states are revised: its residual is small; it is solved; it has been revised so often that of what sticks too
-/// hard one alone begins to slide; and so often that of limits too one alone changes.
-template <class Mask>
-struct Revision {
-  Mask near, solved, late, last;
-};
-
 template <class S>
 class EffectSweeps {
  public:
   EffectSweeps(const EffectPlan& plan, const Model& model) : plan_(plan), tree_(model.tree) {
     const Effects& effects = plan.effects;
     const auto rows = [](Field<S>& field, std::size_t count) { field.allocate(static_cast<Index>(count)); };
-    if (plan.joints || !std::is_arithmetic_v<S>) sum_.allocate(tree_.shape);  // factors of blocks add both
+    sum_.allocate(tree_.shape);  // factors of blocks add joints and bodies whichever there are
     if (plan.joints) {
       rows(force_, effects.torques.size());
       servos_.entries = effects.servos;
@@ -575,20 +569,5 @@ class EffectSweeps {
   Wrenches<S> wrenches_;
   S ground_potential_ = S(0.0), ground_before_ = S(0.0);
 };
-
-/// Where a scene has none: no memory, and nothing is added to any factor.
-struct NoEffects {
-  NoEffects(const EffectPlan&, const Model&) {}
-  template <class Action>
-  void with_added(const Action& action) const {
-    action(NothingAdded{});
-  }
-  template <class Action>
-  void with_rotors(const Action& action) const {
-    action(NothingAdded{});
-  }
-};
-template <bool kEffects, class S>
-using EffectsIf = std::conditional_t<kEffects, EffectSweeps<S>, NoEffects>;
 
 }  // namespace linden

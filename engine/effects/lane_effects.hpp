@@ -7,10 +7,10 @@
 #include <array>
 #include <cmath>
 
-#include "engine/effects/effect_sweeps.hpp"
+#include "engine/effects/effect_controls.hpp"
+#include "engine/effects/no_effects.hpp"
 #include "engine/solve/block_stepper.hpp"
-#include "engine/solve/instance_stepper.hpp"
-#include "engine/sweeps/lanes_of.hpp"
+#include "kernels/values/lanes_of.hpp"
 #include "kernels/tree/innovation_up.hpp"
 #include "layout/packed_history.hpp"
 
@@ -29,6 +29,7 @@ class LaneEffects {
     before_.allocate(tree_.shape.velocities);
   }
   EffectSweeps<Pack>* operator->() { return &sweeps_; }
+  const EffectPlan& plan() const { return sweeps_.plan(); }
 
   void load(const Block<Real>& block) {
     const auto load = [](const Real* from, Field<Pack>& to) {
@@ -78,15 +79,15 @@ class LaneEffects {
     return L::bits(stopped_bounces(sweeps_.limits(), sweeps_.plan().q_row, q, delta, before_, L::mask(known_)));
   }
 
-  /// What effects do to an evaluation, its exact factor, and its norm.
+  /// What effects do to an evaluation, and to its h^2 x kinetic energy; its exact factor, and its norm.
   template <class Element>
-  Pack act(const BodyConstants<Element>& constants, Workspace<Pack>& work, Evaluation<Pack>& now) {
+  Pack act(const BodyConstants<Element>& constants, Workspace<Pack>& work, Pack& energy) {
     const EffectPlan& plan = sweeps_.plan();
     if (plan.bodies) sweeps_.bodies(constants, work.displacement, work.impulse);
     if (plan.joints) {
       if (plan.balls) displacement_map(tree_, work.motion, work.delta);
       sweeps_.joints(work.delta, work.motion, work.momentum_target);
-      now.energy = now.energy + armature_energy<Pack>(plan.effects.armature, work.delta);
+      energy = energy + armature_energy<Pack>(plan.effects.armature, work.delta);
     }
     const auto& stiffness = sweeps_.joint_sum().stiffness;
     const auto& pull = sweeps_.body_sum().pull;
@@ -100,9 +101,9 @@ class LaneEffects {
     for (Index row = 0; row < v.rows(); ++row) v(row) = sweeps_.within_bend(row, v(row), rate * last_displacement(block.past + row * words));
   }
 
-  /// What is lane l's own, and what effects keep of it, for it to be stepped alone; and of the step that it took so. Contact points ended the step before as the
-  /// block has them, whatever lanes that are solved together have made of them since.
-  void take_out(const Block<Real>& block, int l, InstanceStepper& alone) {
+  /// What is lane l's own, and what effects keep of it, for it to be stepped alone; contact points as they ended the step before, whatever
+  /// lanes that are solved together have made of them since.
+  void take_out(const Block<Real>& block, int l, const EffectControls& alone) {
     const auto take = [&](const Field<Pack>& from, std::span<double> to) {
       for (std::size_t row = 0; row < to.size(); ++row) to[row] = static_cast<double>(L::lane(from(static_cast<Index>(row)), l));
     };
@@ -112,21 +113,21 @@ class LaneEffects {
       alone.set_gain(k, static_cast<double>(L::lane(sweeps_.gains()(k), l)));
     }
     if (block.ground_friction != nullptr) alone.set_ground_friction(static_cast<double>(L::lane(sweeps_.ground_friction(), l)));
-    const EffectMemory memory = alone.effect_memory();
-    for (std::size_t row = 0; row < memory.reading.size(); ++row) {
-      memory.excess_before[row] = static_cast<double>(L::lane(sweeps_.excess_before()(static_cast<Index>(row)), l));
-      memory.reading[row] = static_cast<double>(L::lane(sweeps_.reading()(static_cast<Index>(row)), l));
-      memory.bend[row] = static_cast<double>(L::lane(sweeps_.bend()(static_cast<Index>(row)), l));
-    }
+    const EffectControls::Reading reading = alone.reading();
+    take(sweeps_.excess_before(), reading.excess_before);
+    take(sweeps_.reading(), reading.reading);
+    take(sweeps_.bend(), reading.bend);
     for (Index k = 0; k < sweeps_.plan().kept(); ++k) alone.set_kept(k, static_cast<double>(block.kept[k * W + l]));
   }
-  void keep_alone(const Block<Real>& block, int l, InstanceStepper& alone) {
-    const EffectMemory memory = alone.effect_memory();
-    for (std::size_t row = 0; row < memory.reading.size(); ++row) {
-      L::set_lane(sweeps_.excess_before()(static_cast<Index>(row)), l, memory.excess_before[row]);
-      L::set_lane(sweeps_.reading()(static_cast<Index>(row)), l, memory.reading[row]);
-      L::set_lane(sweeps_.bend()(static_cast<Index>(row)), l, memory.bend[row]);
-    }
+  /// And of the step that it took so.
+  void keep_alone(const Block<Real>& block, int l, const EffectControls& alone) {
+    const auto give = [&](std::span<const double> from, Field<Pack>& to) {
+      for (std::size_t row = 0; row < from.size(); ++row) L::set_lane(to(static_cast<Index>(row)), l, from[row]);
+    };
+    const EffectControls::Reading reading = alone.reading();
+    give(reading.excess_before, sweeps_.excess_before());
+    give(reading.reading, sweeps_.reading());
+    give(reading.bend, sweeps_.bend());
     for (Index k = 0; k < sweeps_.plan().kept(); ++k) block.kept[k * W + l] = static_cast<Real>(alone.kept(k));
   }
 

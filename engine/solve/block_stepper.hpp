@@ -57,7 +57,7 @@ struct Block {
   const Real* frictions;      // [frictions] forces of each instance; null: the plan's
   const Real* gains;          // [servos] factors of stiffness and damping of each instance; null: 1
   const Real* ground_friction;  // Coulomb's coefficient of each instance; null: the plan's
-  Real* excess_before;        // [nv] see EffectMemory; null: no effects
+  Real* excess_before;        // [nv] see EffectControls::Reading; null: no effects
   Real* reading;              // [nv] likewise
   Real* bend;                 // [nv] likewise
   Real* kept;                 // [EffectPlan::kept] (EffectSweeps::kept); null: none
@@ -84,7 +84,6 @@ struct BlockSetup {
   const Model& model;
   const BodyConstants<Real>& constants;
   const Options& options;
-  bool own_masses;  // Block::mass is given
   const EffectPlan& plan;  // beside gravity
 };
 

@@ -47,7 +47,7 @@ void InstanceStepper::refresh() {
 StepReport InstanceStepper::step(double time) {
   refresh();
   int history = 0;
-  return stepper_->step(state_, history, time, options_.step, false);
+  return stepper_->step(state_, history, time, options_.step, Then::stop);
 }
 
 void InstanceStepper::set_velocities(std::span<const double> v) {

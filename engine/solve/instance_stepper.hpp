@@ -25,15 +25,8 @@ class InstanceStepper {
 
   /// Before all else of an instance: nothing is left of the one before it.
   void forget();
-  /// What effects keep of the step before, to be written, and of the step taken, to be read; see Stepper.
-  EffectMemory effect_memory() { return stepper_->effect_memory(); }
-  double kept(Index k) const { return stepper_->kept(k); }
-  void set_kept(Index k, double number) { stepper_->set_kept(k, number); }
-  /// Targets of the plan's servos, to be written.
-  std::span<double> servo_targets() { return stepper_->servo_targets(); }
-  std::span<double> friction_forces() { return stepper_->friction_forces(); }
-  void set_gain(Index k, double factor) { stepper_->set_gain(k, factor); }
-  void set_ground_friction(double coefficient) { stepper_->set_ground_friction(coefficient); }
+  /// To set effects, and what they keep: to be written before a step and read after it.
+  EffectControls controls() { return stepper_->controls(); }
 
   /// One step of the state, from `time` on. The latest row of state().history and state().last_step say what is known of the step before.
   StepReport step(double time);

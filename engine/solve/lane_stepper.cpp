@@ -12,9 +12,7 @@ using PackOf = LINDEN_PACK;
 
 template <class Real>
 std::unique_ptr<BlockStepper<Real>> make_lane_stepper(const BlockSetup<Real>& setup) {
-  using Pack = PackOf<Real>;
-  if (setup.own_masses) return std::make_unique<LaneStepper<Pack, true, LINDEN_ACTING>>(setup);
-  return std::make_unique<LaneStepper<Pack, false, LINDEN_ACTING>>(setup);
+  return std::make_unique<LaneStepper<PackOf<Real>, LINDEN_ACTING>>(setup);
 }
 
 }  // namespace

@@ -6,10 +6,12 @@
 // Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "engine/effects/effect_controls.hpp"
 #include "engine/effects/effect_plan.hpp"
 #include "engine/effects/effect_work.hpp"
 #include "engine/effects/step_impulses.hpp"
@@ -28,10 +30,9 @@ struct Energy {
   double gravity() const { return potential - springs - ground; }
 };
 
-/// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading).
-struct EffectMemory {
-  std::span<double> excess_before, reading, bend;
-};
+/// What follows a step: nothing that is known of, or a step of the same h before anything else is asked of stepper and state, which may then
+/// be left for that step to complete.
+enum class Then : std::uint8_t { stop, step };
 
 class Stepper {
  public:
@@ -48,9 +49,8 @@ class Stepper {
 
   /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
   /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
-  /// another: a step of the same h follows before anything else is asked of the stepper or the state, which may then be left for that step
-  /// to complete. A step that fails leaves the state complete, as it was at its beginning.
-  virtual StepReport step(State<double>& state, int& history, double time, double h, bool another) = 0;
+  /// A step that fails leaves the state complete, as it was at its beginning.
+  virtual StepReport step(State<double>& state, int& history, double time, double h, Then then) = 0;
   /// Of effects, in the step taken last.
   virtual const EffectAccount& effect_account() const = 0;
 
@@ -58,19 +58,8 @@ class Stepper {
   virtual void keep_impulses() = 0;
   virtual const StepImpulses& impulses() const = 0;
 
-  /// Targets of the servos [rad, m] in the order of Effects::servos, to be written between steps; NaN: that of the servo's table. Empty
-  /// without servos.
-  virtual std::span<double> servo_targets() = 0;
-  /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
-  virtual std::span<double> friction_forces() = 0;
-  /// Factor of the stiffness and damping of servo k; Coulomb's coefficient of the ground. Likewise.
-  virtual void set_gain(Index k, double factor) = 0;
-  virtual void set_ground_friction(double coefficient) = 0;
-  /// What effects keep of the step taken last; written where it is that of another state. Empty without effects.
-  virtual EffectMemory effect_memory() = 0;
-  /// Number k of EffectSweeps::kept, likewise.
-  virtual double kept(Index k) const = 0;
-  virtual void set_kept(Index k, double number) = 0;
+  /// To set effects, and what they keep of the step taken last.
+  virtual EffectControls controls() = 0;
   /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
   virtual std::vector<std::span<double>> memory() = 0;
 

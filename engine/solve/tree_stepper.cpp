@@ -7,58 +7,32 @@
 #include <utility>
 
 #include "engine/guess/first_guess.hpp"
-#include "engine/solve/convergence.hpp"
 #include "engine/solve/diagnosis.hpp"
-#include "kernels/tree/largest_turn.hpp"
 #include "kernels/tree/momentum_update_map.hpp"
 #include "kernels/tree/motion_map.hpp"
 
 namespace linden {
-namespace {
-
-constexpr int kMaxBacktracks = 10;
-
-/// Only a residual within this factor of the tolerance is looked at for bare rounding: the look costs a tenth of a correction.
-constexpr double kNearTolerance = 1e4;
-
-/// Revisions of effects' states in one solve: a pile of joints that stick and slide at once takes some ten.
-constexpr int kMostRevisions = 20, kLastRevision = 60;
-
-/// From then on they are made one by one.
-constexpr int kBulkRevisions = 5;
-
-/// Where they do not settle: speeds up to which friction is made smooth, one after the other [m/s, rad/s].
-constexpr double kSoftCreeps[] = {1e-2, 1e-3, 1e-4, 1e-5};
-constexpr int kMostSoftCorrections = 40;
-
-/// A correction is cut where the slope at its end is steeper than this share of that at its beginning, the other way.
-constexpr double kSteepest = 0.5;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
 
 template <bool kEffects>
 TreeStepper<kEffects>::TreeStepper(const Model& model, const Options& options, const EffectPlan& plan)
     : model_(model),
       options_(options),
-      max_iterations_(options.max_iterations > 0 ? options.max_iterations : options.solver == Solver::newton ? 50 : 1000),
       has_stages_(options.order != 2),
       sweeps_(model, options, plan),
       work_(sweeps_.work()),
       effects_(sweeps_.effects()),
+      solve_(model, options_, sweeps_),
       blows_(sweeps_, model.tree.shape.velocities) {
   check(options);
   last_good_.allocate(model.tree.shape);
   before_.allocate(model.tree.shape.velocities);
   if constexpr (kEffects) {
-    before_innovation_.allocate(model.tree.shape.velocities);
     keep(last_good_);  // no step allocates
   }
 }
 
 template <bool kEffects>
-StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h, bool another) {
+StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h, Then then) {
   StepReport report;
   time_ = time;
   clear_account();
@@ -68,7 +42,7 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
   }
   if (changes) keep(state);
   const int history_before = history;
-  report.status = advance(state, history, h, another, report);
+  report.status = advance(state, history, h, then, report);
   if (report.ok()) return report;
   // The whole step failed: two halves, each split again if need be, from the state as it was.
   if (changes) {
@@ -83,7 +57,7 @@ StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, doubl
     report.slot = 0;
     return report;
   }
-  report.residual = failed_residual_;
+  report.residual = solve_.failed_residual();
   restore(state);
   history = history_before;
   return report;
@@ -95,7 +69,7 @@ void TreeStepper<kEffects>::keep(const State<double>& state) {
   last_good_ = state;
   if constexpr (kEffects) {
     last_memory_.clear();
-    for (const std::span<double> numbers : effects_.memory()) last_memory_.insert(last_memory_.end(), numbers.begin(), numbers.end());
+    for (const std::span<double> numbers : controls().memory()) last_memory_.insert(last_memory_.end(), numbers.begin(), numbers.end());
   }
 }
 
@@ -105,7 +79,7 @@ void TreeStepper<kEffects>::restore(State<double>& state) {
   clear_account();
   if constexpr (kEffects) {
     auto next = last_memory_.begin();
-    for (const std::span<double> numbers : effects_.memory()) {
+    for (const std::span<double> numbers : controls().memory()) {
       std::copy_n(next, numbers.size(), numbers.begin());
       next += static_cast<std::ptrdiff_t>(numbers.size());
     }
@@ -114,13 +88,13 @@ void TreeStepper<kEffects>::restore(State<double>& state) {
 }
 
 template <bool kEffects>
-StepStatus TreeStepper<kEffects>::advance(State<double>& state, int& history, double h, bool another, StepReport& report) {
+StepStatus TreeStepper<kEffects>::advance(State<double>& state, int& history, double h, Then then, StepReport& report) {
   if constexpr (kEffects) {
     if (state.last_step(0) == 0) strike(state, h, false, report);
     if (effects_.plan().bounces) return advance_with_blows(state, history, h, report);
   }
   const StepStatus status = solve(state, history, h, report);
-  if (status == StepStatus::converged) finish(state, history, h, another, report);
+  if (status == StepStatus::converged) finish(state, history, h, then, report);
   return status;
 }
 
@@ -144,7 +118,7 @@ StepStatus TreeStepper<kEffects>::advance_with_blows(State<double>& state, int& 
       if (status != StepStatus::converged) return status;
       part = left;
     }
-    finish(state, history, part, false, report);
+    finish(state, history, part, Then::stop, report);
     if (part < left || blows > 0) history = 0;
     left -= part;
   }
@@ -202,7 +176,7 @@ template <bool kEffects>
 bool TreeStepper<kEffects>::halves(State<double>& state, int& history, double h, int depth, StepReport& report) {
   if (depth > options_.max_splits) return false;
   for (int half = 0; half < 2; ++half) {
-    report.status = advance(state, history, h / 2, false, report);
+    report.status = advance(state, history, h / 2, Then::stop, report);
     if (report.ok()) {
       report.substeps += 1;
     } else if (!halves(state, history, h / 2, depth + 1, report)) {
@@ -211,19 +185,6 @@ bool TreeStepper<kEffects>::halves(State<double>& state, int& history, double h,
     history = 0;
   }
   return true;
-}
-
-template <bool kEffects>
-bool TreeStepper<kEffects>::converged(const Evaluated& now, double norm, double h) const {
-  if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * std::abs(h);
-  return 0.5 * norm <= options_.tolerance * options_.tolerance * now.scale || norm <= enough_;
-}
-
-/// h^2 x kinetic energy that gravity gives in a step to what is at rest.
-template <bool kEffects>
-double TreeStepper<kEffects>::fall(double h) const {
-  const auto& g = options_.gravity;
-  return 0.5 * sweeps_.constants().subtree_mass(0) * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * h * h * h * h;
 }
 
 template <bool kEffects>
@@ -238,7 +199,7 @@ void TreeStepper<kEffects>::begin_effects(const State<double>& state, double h)
     for (double& value : before_.flat()) value *= h;
   }
   effects_.begin({time_}, h, state.q, before_, state.last_step(0) != 0, passable_, work_.delta);
-  sweeps_.begin(fall(h));
+  sweeps_.begin(solve_.fall(h));
 }
 
 /// before_: displacement of the step before; of a step of its own length, had it been as long as this one.
@@ -250,25 +211,9 @@ void TreeStepper<kEffects>::know_before(const State<double>& state, double h) {
 }
 
 template <bool kEffects>
-std::span<double> TreeStepper<kEffects>::servo_targets() {
-  if constexpr (kEffects) return effects_.servo_targets().flat();
+EffectControls TreeStepper<kEffects>::controls() {
+  if constexpr (kEffects) return EffectControls(effects_);
   return {};
-}
-
-template <bool kEffects>
-std::span<double> TreeStepper<kEffects>::friction_forces() {
-  if constexpr (kEffects) return effects_.friction_forces().flat();
-  return {};
-}
-
-template <bool kEffects>
-void TreeStepper<kEffects>::set_gain([[maybe_unused]] Index k, [[maybe_unused]] double factor) {
-  if constexpr (kEffects) effects_.set_gain(k, factor);
-}
-
-template <bool kEffects>
-void TreeStepper<kEffects>::set_ground_friction([[maybe_unused]] double coefficient) {
-  if constexpr (kEffects) effects_.ground_friction() = coefficient;
 }
 
 template <bool kEffects>
@@ -292,51 +237,25 @@ const StepImpulses& TreeStepper<kEffects>::impulses() const {
 }
 
 template <bool kEffects>
-EffectMemory TreeStepper<kEffects>::effect_memory() {
-  if constexpr (kEffects) return {effects_.excess_before().flat(), effects_.reading().flat(), effects_.bend().flat()};
-  return {};
-}
-
-template <bool kEffects>
-void TreeStepper<kEffects>::set_kept([[maybe_unused]] Index k, [[maybe_unused]] double number) {
-  if constexpr (kEffects) effects_.set_kept(k, number);
-}
-
-template <bool kEffects>
-double TreeStepper<kEffects>::kept([[maybe_unused]] Index k) const {
-  if constexpr (kEffects) return effects_.kept(k);
-  return 0;
-}
-
-template <bool kEffects>
 std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
-  std::vector<std::span<double>> kept;
-  if constexpr (kEffects) {
-    const auto of_effects = effects_.memory();
-    kept.assign(of_effects.begin(), of_effects.end());
-  }
+  std::vector<std::span<double>> kept = controls().memory();
   if (has_stages_) kept.push_back(before_.flat());
-  if (sweeps_.holds()) {
+  if (sweeps_.reuses_factor()) {
     const auto factor = sweeps_.factor_memory();
-    kept.insert(kept.end(), {held_.numbers(), factor[0], factor[1], factor[2]});
+    kept.insert(kept.end(), {solve_.held().numbers(), factor[0], factor[1], factor[2]});
   }
   return kept;
 }
 
-/// Whether the state of an effect changed; work_.delta then says what the motion is to be.
-template <bool kEffects>
-bool TreeStepper<kEffects>::revise_effects(const Revision<bool>& revision)
-  requires kEffects
-{
-  if (!effects_.revise(sweeps_.left(), revision, work_.delta)) return false;
-  spread_mimics<double>(sweeps_.mimics(), work_.delta);  // of a coordinate that comes to hold its leader's row was set
-  displacement_map(model_.tree, work_.motion, work_.delta);
-  return true;
-}
-
 template <bool kEffects>
 StepStatus TreeStepper<kEffects>::solve(State<double>& state, int history, double h, StepReport& report) {
-  const StepStatus status = find_root(state, history, h, report);
+  Factor factor = solve_.factor_for(history);
+  Evaluated<double> first = first_evaluation(state, history, h, factor, report);
+  if (!usable(first)) {
+    first = evaluation_at_rest(report);
+    factor = Factor::fresh;
+  }
+  const StepStatus status = solve_.run(first, factor, h, report);
   if (status != StepStatus::converged) return status;
   displacement_map(model_.tree, work_.motion, work_.delta);
   if (gains_energy(state, history, h, report)) {
@@ -347,236 +266,77 @@ StepStatus TreeStepper<kEffects>::solve(State<double>& state, int history, doubl
   return StepStatus::converged;
 }
 
-/// Whether the solution is another root than the motion's; see convergence.hpp. Nothing is known of the step before the first.
+/// Whether the solution is another root than the motion's; see judge.hpp. Nothing is known of the step before the first.
 template <bool kEffects>
 bool TreeStepper<kEffects>::gains_energy(const State<double>& state, int history, double h, StepReport& report) {
-  if (least_w_ > kFreeCosine || state.last_step(0) == 0) return false;
+  if (solve_.least_w() > kFreeCosine || state.last_step(0) == 0) return false;
   if (history > 0 && options_.guess == FirstGuess::extrapolation) {
     const Extrapolation guess = extrapolation(state.history, history);
-    const double corrected = largest_turn(model_.tree, sweeps_.constants(), work_.delta,
-                                          [&](Index row) { return extrapolated(guess, state.history, row); });
-    if (corrected < kFreeCorrection) return false;
+    const auto guessed = [&](Index row) { return extrapolated(guess, state.history, row); };
+    if (may_be_another_root(model_.tree, sweeps_.constants(), 1, solve_.least_w(), work_.delta, guessed) == 0) return false;
   }
   if (!kEffects) know_before(state, h);
   const EnergyStep energy = sweeps_.energy_step(before_, has_stages_ ? state.last_step(0) : h, h, report);
   return energy.now - energy.before - energy.work > kMostGain * std::max(energy.now, energy.before);
 }
 
-/// Leads to the states that sudden revisions went round in circles about, by friction that is smooth at first and then ever less so;
-/// `whole`: until that has converged.
-///
-/// With smooth friction the solution of the step minimises a function, convex but for the coupling of friction to the load it goes with,
-/// whose gradient is the residual; each correction is cut to where it falls no further. Its slope along a correction is r.(A^-1 r_before),
-/// the sum of u (d^-1 u_before): known from the passes.
 template <bool kEffects>
-void TreeStepper<kEffects>::approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
-  requires kEffects
-{
-  for (const double creep : kSoftCreeps) {
-    const bool to_the_end = whole && creep == std::end(kSoftCreeps)[-1];
-    displacement_map(model_.tree, work_.motion, work_.delta);
-    effects_.soften(creep, work_.delta);
-    spread_mimics<double>(sweeps_.mimics(), work_.delta);
-    now = sweeps_.evaluate(true, report);
-    norm = now.norm;
-    for (int k = 0; k < kMostSoftCorrections; ++k) {
-      if (!now.usable() || !std::isfinite(norm)) return;
-      const bool settled = 0.5 * norm <= kSettled * kSettled * now.scale;
-      if (revise_effects({.near = settled, .solved = false, .late = false, .last = false})) {
-        now = sweeps_.evaluate(true, report);
-        norm = now.norm;
-        continue;
-      }
-      if (to_the_end ? converged(now, norm, h) || sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons) : settled) break;
-      std::ranges::copy(work_.innovation.flat(), before_innovation_.flat().begin());
-      const double slope_before = sweeps_.slope_at_begin();
-      now = sweeps_.solve_and_correct(report);
-      double taken = 1;
-      for (int cut = 0; cut < kMaxBacktracks; ++cut) {
-        double share = 0.5;
-        if (now.usable()) {
-          norm = now.norm;
-          const double slope = sweeps_.slope_at_end(before_innovation_);
-          if (slope > -kSteepest * slope_before) break;
-          share = std::clamp(slope_before / (slope_before - slope), 0.1, 0.9);
-        }
-        now = sweeps_.correct(taken * (share - 1), report);
-        taken *= share;
-      }
-      if (now.usable()) {
-        sweeps_.factor_again(now, report);
-        norm = now.norm;
-      }
-    }
-  }
-}
-
-template <bool kEffects>
-Evaluated TreeStepper<kEffects>::first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report) {
+Evaluated<double> TreeStepper<kEffects>::first_evaluation(State<double>& state, int history, double h, Factor factor, StepReport& report) {
   sweeps_.start(state.q);
-  fresh = history == 0 || !sweeps_.holds() || !held_.serves(options_.tolerance);
-  if (to_end_ != 0) {
+  if (unfinished_) {
+    const double h_before = *unfinished_;
+    unfinished_.reset();
     const Extrapolation guess = extrapolation_after(work_.delta, state.history, history);
-    return sweeps_.arrive_and_evaluate(std::exchange(to_end_, 0.0), state, guess, h, fresh, report);
+    return sweeps_.arrive_and_evaluate(h_before, state, guess, h, factor, report);
   }
   if (!kEffects && options_.guess == FirstGuess::extrapolation && history > 0 && sweeps_.mimics().empty()) {
     // of each part of the tree when its turn comes
-    return sweeps_.evaluate_from(state, extrapolation(state.history, history), h, fresh, report);
+    return sweeps_.evaluate_from(state, extrapolation(state.history, history), h, factor, report);
   }
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
   first_guess(options_.guess, model_, state, history, h, sweeps_);
   if constexpr (kEffects) begin_effects(state, h);
   spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
-  return sweeps_.evaluate(fresh, report);
+  return sweeps_.evaluate(factor, report);
 }
 
+/// No displacement at all is always within the range of log; what is given moves all the same.
 template <bool kEffects>
-StepStatus TreeStepper<kEffects>::find_root(State<double>& state, int history, double h, StepReport& report) {
-  const int factors_before = report.factorisations;
-  bool fresh;  // the factor belongs to the current displacement
-  Evaluated now = first_evaluation(state, history, h, fresh, report);
-  if (!now.usable()) {
-    // no displacement at all is always within the range of log
-    for (double& value : work_.delta.flat()) value = 0;
-    if constexpr (kEffects) {
-      if (effects_.plan().joints) effects_.put_motions(work_.delta);
-      spread_mimics<double>(sweeps_.mimics(), work_.delta);
-    }
-    now = sweeps_.evaluate(true, report);
-    fresh = true;
+Evaluated<double> TreeStepper<kEffects>::evaluation_at_rest(StepReport& report) {
+  std::ranges::fill(work_.delta.flat(), 0.0);
+  if constexpr (kEffects) {
+    if (effects_.plan().joints) effects_.put_motions(work_.delta);
+    spread_mimics<double>(sweeps_.mimics(), work_.delta);
   }
-  const bool held = !fresh;  // until the first correction has been made, at the least
-  double norm = now.norm;
-  held_.begin(std::sqrt(0.5 * norm / now.scale), fresh);
-  enough_ = options_.reduction * options_.reduction * std::min(norm, 2 * kRoughGuess * kRoughGuess * now.scale);
-  StepStatus trouble = StepStatus::not_converged;  // of the last correction that had to be cut short
-
-  bool at_floor = false;
-  const auto end = [&](StepStatus status) {
-    const double relative = now.scale > 0 ? std::sqrt(0.5 * norm / now.scale) : std::sqrt(norm);
-    if (status == StepStatus::converged) {
-      held_.end(relative, at_floor, !held || report.factorisations > factors_before);
-      least_w_ = now.least_w;
-      mean_kinetic_ = now.energy / (h * h);
-      report.residual = std::max(report.residual, relative);
-    } else {
-      held_.drop();
-      failed_residual_ = relative;
-    }
-    if (status == StepStatus::not_converged) report.slot = largest_residual(model_, work_, sweeps_.yields());
-    return status;
-  };
-  const auto try_out = [&](const Evaluated& tried) {
-    now = tried;
-    if (now.usable()) return now.norm;
-    trouble = now.least_w > 0 ? StepStatus::not_finite : StepStatus::past_pi;
-    sweeps_.complete();
-    report.slot = worst_displacement(model_, work_);
-    return kInfinity;
-  };
-
-  // the evaluation and factor for other states of effects, where they changed
-  int revisions = 0;
-  const auto revised = [&]([[maybe_unused]] bool near, [[maybe_unused]] bool solved) {
-    if constexpr (kEffects) {
-      const bool revises = effects_.plan().revises;
-      if (revises && sweeps_.has_slopes() && (revisions == kBulkRevisions || revisions == kMostRevisions)) {
-        // at first only to find the states; where they still do not settle the step stays with friction smooth below the least creep
-        const bool whole = revisions == kMostRevisions;
-        approach_softly(now, norm, h, whole, report);
-        if (!whole) effects_.harden();
-        displacement_map(model_.tree, work_.motion, work_.delta);
-      } else {
-        if (!revises || !now.usable() || !std::isfinite(norm) || revisions == kLastRevision) return false;
-        const bool late = revisions >= kBulkRevisions, last = revisions >= 2 * kBulkRevisions;
-        if (!revise_effects({.near = near, .solved = solved, .late = late, .last = last})) return false;
-        report.iterations += 1;
-      }
-      revisions += 1;
-      now = sweeps_.evaluate(true, report);
-      norm = now.norm;
-      return fresh = true;
-    }
-    return false;
-  };
-
-  for (int iteration = 0;; ++iteration) {
-    if (!std::isfinite(norm) || !now.usable()) {
-      sweeps_.complete();
-      report.slot = worst_displacement(model_, work_);
-      return end(StepStatus::not_finite);
-    }
-    const bool done = at_floor || converged(now, norm, h);
-    if (revised(done || 0.5 * norm <= kSettled * kSettled * now.scale, done)) {
-      at_floor = false;
-      continue;
-    }
-    if (done && revisions < kLastRevision) {
-      report.at_rounding_floor |= at_floor;
-      return end(StepStatus::converged);
-    }
-    if (iteration >= max_iterations_ || done) return end(StepStatus::not_converged);
-
-    const double before = norm;
-    double taken = 1;
-    norm = try_out(sweeps_.solve_and_correct(report));
-    if (revised(false, false)) continue;
-    const bool slow = norm > kSlowProgress * kSlowProgress * before;
-    const bool close = norm <= kNearTolerance * kNearTolerance * options_.tolerance * options_.tolerance * now.scale;
-    at_floor = (slow && sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) ||
-               (close && !converged(now, norm, h) && sweeps_.at_rounding_floor(now, norm, fall(h), kBareRounding));
-    if (held && iteration == 0) held_.corrected(std::sqrt(norm / before), at_floor);
-    if (at_floor) continue;
-    for (int cut = 0; !(norm < before) && cut < kMaxBacktracks; ++cut) {
-      taken /= 2;
-      norm = try_out(sweeps_.correct(-taken, report));
-      report.backtracks += 1;
-    }
-    if (!(norm < before)) {
-      norm = try_out(sweeps_.correct(-taken, report));  // back to where this iteration began
-      if (sweeps_.at_rounding_floor(now, norm, fall(h), kFloorEpsilons)) {
-        at_floor = true;
-        continue;
-      }
-      if (fresh || options_.solver == Solver::riqn) return end(trouble);
-    }
-    fresh = false;
-    // a held factor that another correction like this would not be enough with has been held for too long
-    const bool stale = held && iteration == 0 && 0.5 * norm * (norm / before) > options_.tolerance * options_.tolerance * now.scale;
-    if ((slow || stale) && options_.solver == Solver::newton) {
-      sweeps_.factor_again(now, report);
-      norm = now.norm;
-      fresh = true;
-    }
-  }
+  return sweeps_.evaluate(Factor::fresh, report);
 }
 
 /// The new state, from a displacement that solves the step.
 template <bool kEffects>
-void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, bool another, [[maybe_unused]] StepReport& report) {
+void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, Then then, [[maybe_unused]] StepReport& report) {
   EffectAccount part;
   if constexpr (kEffects) {
-    part = effects_.account(sweeps_.left(), work_.delta, before_, state.last_step(0) == h);
+    part = effects_.account(sweeps_.joint_residual(), work_.delta, before_, state.last_step(0) == h);
     if (impulses_.kept()) {
-      impulses_.add(effects_, model_, h, state.q, work_.placement, work_.motion, work_.delta, sweeps_.left());
+      impulses_.add(effects_, model_, h, state.q, work_.placement, work_.motion, work_.delta, sweeps_.joint_residual());
     }
-    if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.left(), work_.increment);
+    if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.joint_residual(), work_.end_impulse);
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
   history = std::min(history + 1, kHistory);
   const bool known = !has_stages_ && state.last_step(0) != 0;
   state.last_step(0) = h;
-  if (!kEffects && another && sweeps_.can_go_on() && options_.guess == FirstGuess::extrapolation) {
-    to_end_ = h;
+  if (!kEffects && then == Then::step && sweeps_.can_go_on() && options_.guess == FirstGuess::extrapolation) {
+    unfinished_ = h;
     return;
   }
   sweeps_.arrive(h, state);
   if constexpr (kEffects) {
     part.work.ground -= effects_.ground_stored();
-    part.kinetic = mean_kinetic_;
+    part.kinetic = solve_.mean_kinetic();
     account_.add(part);
     time_ += h;
-    for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.increment(row);
+    for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.end_impulse(row);
   }
   fold_mimics(sweeps_.mimics(), state.p);
   if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
@@ -588,7 +348,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
 
 template <bool kEffects>
 void TreeStepper<kEffects>::forget() {
-  held_ = {};
+  solve_.held() = {};
   if constexpr (kEffects) effects_.forget();
 }
 
@@ -622,7 +382,7 @@ Energy TreeStepper<kEffects>::energy_of(const State<double>& state, Field<double
 template <bool kEffects>
 Wrench<double> TreeStepper<kEffects>::total_momentum(const State<double>& state, Field<double>& rate) {
   sweeps_.read_velocity(state.p, rate);
-  sweeps_.momentum_of(rate, work_.increment);
+  sweeps_.momentum_of(rate, work_.momentum);
   return load<Wrench, double>(work_.impulse, 0);
 }
 

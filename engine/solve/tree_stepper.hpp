@@ -13,17 +13,18 @@
 // Effects (effect_sweeps.hpp) act after momentum_map and on the target, are part of the factor, and have their states - sticks, slides,
 // at a limit - revised between corrections. Compiled with them and without (kEffects): a step without asks for none.
 //
-// The equation may have other roots, far from the motion, once a step is too large for it (convergence.hpp). Whoever lands on one gains
+// The equation may have other roots, far from the motion, once a step is too large for it (judge.hpp). Whoever lands on one gains
 // energy out of nothing: where a step turns bodies by much and its solution lies far from the first guess, kinetic energy of the mean
 // motion minus the work of the impulses at its beginning is compared with the step before. Other steps are not asked.
 #pragma once
 
+#include <optional>
 #include <type_traits>
 
 #include "engine/effects/blows.hpp"
 #include "engine/effects/impulse_account.hpp"
-#include "engine/solve/held_factor.hpp"
 #include "engine/solve/stepper.hpp"
+#include "engine/solve/tree_solve.hpp"
 #include "engine/sweeps/tree_sweeps.hpp"
 
 namespace linden {
@@ -37,17 +38,11 @@ class TreeStepper final : public Stepper {
   void apply(std::span<const double> force) override { sweeps_.apply(force); }
   void use(const BodyConstants<double>& constants) override { sweeps_.use(constants); }
   void forget() override;
-  StepReport step(State<double>& state, int& history, double time, double h, bool another) override;
+  StepReport step(State<double>& state, int& history, double time, double h, Then then) override;
   const EffectAccount& effect_account() const override { return account_; }
   void keep_impulses() override;
   const StepImpulses& impulses() const override;
-  std::span<double> servo_targets() override;
-  std::span<double> friction_forces() override;
-  void set_gain(Index k, double factor) override;
-  void set_ground_friction(double coefficient) override;
-  EffectMemory effect_memory() override;
-  double kept(Index k) const override;
-  void set_kept(Index k, double number) override;
+  EffectControls controls() override;
   std::vector<std::span<double>> memory() override;
   void read_velocity(const State<double>& state, Field<double>& v) override;
   void momentum_of(const Field<double>& v, Field<double>& p) override { sweeps_.momentum_of(v, p); }
@@ -55,19 +50,14 @@ class TreeStepper final : public Stepper {
   Energy energy_of(const State<double>& state, Field<double>& rate) override;
 
  private:
-  bool converged(const Evaluated& now, double norm, double h) const;
   bool gains_energy(const State<double>& state, int history, double h, StepReport& report);
   void begin_effects(const State<double>& state, double h)
     requires kEffects;
-  bool revise_effects(const Revision<bool>& revision)
-    requires kEffects;
-  void approach_softly(Evaluated& now, double& norm, double h, bool whole, StepReport& report)
-    requires kEffects;
   void know_before(const State<double>& state, double h);
   void within_bend(const State<double>& state, Field<double>& v) const;
-  double fall(double h) const;
-  Evaluated first_evaluation(State<double>& state, int history, double h, bool& fresh, StepReport& report);
-  StepStatus advance(State<double>& state, int& history, double h, bool another, StepReport& report);
+  Evaluated<double> first_evaluation(State<double>& state, int history, double h, Factor factor, StepReport& report);
+  Evaluated<double> evaluation_at_rest(StepReport& report);
+  StepStatus advance(State<double>& state, int& history, double h, Then then, StepReport& report);
   StepStatus advance_with_blows(State<double>& state, int& history, double h, StepReport& report)
     requires kEffects;
   double time_of_blow(State<double>& state, double h, StepReport& report)
@@ -78,27 +68,20 @@ class TreeStepper final : public Stepper {
   void keep(const State<double>& state);
   void restore(State<double>& state);
   StepStatus solve(State<double>& state, int history, double h, StepReport& report);
-  StepStatus find_root(State<double>& state, int history, double h, StepReport& report);
   bool halves(State<double>& state, int& history, double h, int depth, StepReport& report);
-  void finish(State<double>& state, int& history, double h, bool another, StepReport& report);
+  void finish(State<double>& state, int& history, double h, Then then, StepReport& report);
 
   const Model& model_;
   Options options_;
-  int max_iterations_;
   bool has_stages_;  // steps are sub-steps, of lengths that differ from one to the next
   TreeSweeps<kEffects> sweeps_;
   Workspace<double>& work_;
   EffectsIf<kEffects, double>& effects_;
-  double enough_ = 0;           // squared energy norm of a residual that will do, beside the tolerance
-  double least_w_ = 1;          // of the root found last: see displacement_down
-  double to_end_ = 0;           // h of a step that is solved and left for the next one to end; else 0
-  double failed_residual_ = 0;  // of the last solve that failed
-  double mean_kinetic_ = 0;  // of the mean motion of the root found last [J]
-  EffectAccount account_;    // of the whole step
+  TreeSolve<kEffects> solve_;
+  std::optional<double> unfinished_;  // h of a step that is solved and left for the next one to end
+  EffectAccount account_;  // of the whole step
   [[no_unique_address]] std::conditional_t<kEffects, ImpulseAccount, NoImpulses> impulses_;  // likewise, where somebody asks
-  Field<double> before_;             // see know_before
-  Field<double> before_innovation_;  // of approach_softly
-  HeldFactor held_;
+  Field<double> before_;  // see know_before
   [[no_unique_address]] std::conditional_t<kEffects, Blows, NoBlows> blows_;
   bool passable_ = false;  // see limits.hpp
   double time_ = 0;

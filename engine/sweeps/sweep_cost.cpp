@@ -67,7 +67,7 @@ class Bench {
       std::ranges::copy(start.velocities, v.flat().begin());
       stepper_->momentum_of(v, state_.p);
     }
-    for (int k = 0; k < kSteps && stepper_->step(state_, history_, k * options.step, options.step, false).ok(); ++k) {
+    for (int k = 0; k < kSteps && stepper_->step(state_, history_, k * options.step, options.step, Then::stop).ok(); ++k) {
     }
     impulse_.allocate(model.tree.shape.slots);
     rate_.allocate(model.tree.shape.velocities);
@@ -103,7 +103,7 @@ class Bench {
       effects.begin({0.0}, options_.step, state_.q, rate_, history_ > 0, false, work_.delta);
       sweeps_.begin(0);
     }
-    sweeps_.evaluate(true, report);
+    sweeps_.evaluate(Factor::fresh, report);
     momentum_map(model_.tree, model_.constants, work_.displacement, impulse_);  // as it was before it was summed over the subtrees
   }
 
@@ -149,7 +149,7 @@ class Bench {
     add("gravity_field_down", [&, g] { gravity_field_down(tree, w.placement, g, w.field); });
     add("gravity_force_up", [&] { gravity_force_up(tree, constants, w.placement, w.field, w.first_moment, w.force); });
     add("momentum_update_map", [&, h] {
-      momentum_update_map(tree, constants, h, w.displacement, impulse_, sweeps_.left(), w.force, p_);
+      momentum_update_map(tree, constants, h, w.displacement, impulse_, sweeps_.joint_residual(), w.force, p_);
     });
     add("fold_mimics", [&] { fold_mimics(sweeps_.mimics(), p_); });
     if constexpr (kEffects) {

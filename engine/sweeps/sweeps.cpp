@@ -3,16 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/sweeps/strategy.hpp"
+
 namespace linden {
 
 std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const EffectPlan& plan) {
   const Effects& effects = plan.effects;
   const bool joints = plan.joints, bodies = plan.bodies, points = !plan.ground.points.empty();
   const bool limited = std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
-  const bool gravity = options.gravity != std::array<double, 3>{0, 0, 0};
   const bool newton = options.solver == Solver::newton;
   const bool ties = !model.mimics.empty();
-  const bool one_pass = newton && options.stop == StopTest::energy && !ties;
+  const Strategy strategy = strategy_of(model, options, plan);
+  const bool gravity = strategy.gravity, one_pass = strategy.one_pass;
   const bool quaternions = std::ranges::any_of(model.tree.runs, [](const Run& run) { return run.kind != JointKind::screw; });
   std::vector<Sweep> list;
   const auto add = [&](bool present, const Sweep& sweep) {

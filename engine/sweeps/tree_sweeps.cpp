@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "engine/solve/convergence.hpp"
 #include "kernels/tree/advance_map.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/displacement_down.hpp"
@@ -25,23 +24,7 @@
 namespace linden {
 namespace {
 
-/// Whether branches are to share rows. Motions of screws follow from delta and placements from q; motions of other joints are corrected
-/// from one evaluation to the next and need rows of their own.
-bool shares_rows(const Tree& tree) {
-  return !tree.branches.empty() && tree.trunk.end + kBranch <= tree.shape.slots / 2 && tree.runs.size() == 1 &&
-         tree.runs.front().kind == JointKind::screw;
-}
-
-/// Whether this is one long chain: all trunk but for its end.
-bool is_long_chain(const Tree& tree) {
-  if (tree.branches.empty()) return false;
-  for (Index i = 1; i < tree.shape.slots; ++i) {
-    if (tree.parent(i) != i - 1) return false;
-  }
-  return true;
-}
-
-constexpr auto nothing = [](Slots, Evaluated&) {};
+constexpr auto nothing = [](Slots, Evaluated<double>&) {};
 
 }  // namespace
 
@@ -50,49 +33,45 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
     : model_(model),
       constants_(&model.constants),
       options_(options),
-      has_gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
-      one_pass_(options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty()),
-      holds_(one_pass_ && options.order == 2 && options.guess == FirstGuess::extrapolation && !plan.revises),
+      strategy_(strategy_of(model, options, plan)),
       ties_(model.mimics, model.tree),
       effects_(plan, model),
       tree_(model.tree) {
   work_.allocate(model.tree.shape);
-  if (holds_) mass_.allocate(model.tree.shape);
+  if (strategy_.reuses_factor) mass_.allocate(model.tree.shape);
   if (!plan.effects.motions.empty()) given_.allocate(model.tree.shape.velocities);
-  is_long_chain_ = !kEffects && one_pass_ && options.order == 2 && is_long_chain(model.tree);
-  shares_rows_ = !kEffects && one_pass_ && options.order == 2 && shares_rows(model.tree);
 }
 
 /// Placements of some bodies, and gravity there.
 template <bool kEffects>
 void TreeSweeps<kEffects>::place(const Field<double>& q, Slots part) {
   placement_map(model_.tree, *constants_, q, part, work_.placement);
-  if (has_gravity_) gravity_field_down(model_.tree, work_.placement, gravity(), part, work_.field);
+  if (strategy_.gravity) gravity_field_down(model_.tree, work_.placement, gravity(), part, work_.field);
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::find_potentials([[maybe_unused]] const Field<double>& q) {
-  if (has_gravity_) potential_ = gravity_potential(work_.field, work_.first_moment);
+  if (strategy_.gravity) potential_ = gravity_potential(work_.field, work_.first_moment);
   if constexpr (kEffects) {
     effect_potential_ = effects_.refresh(work_.placement, q);
-    potential_ = (has_gravity_ ? potential_ : 0) + effect_potential_;
+    potential_ = (strategy_.gravity ? potential_ : 0) + effect_potential_;
   }
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::refresh(const Field<double>& q) {
   tree_.run(
-      true, false, [&](Slots part, Evaluated&) { place(q, part); }, [&](Slots part, Evaluated&) { forces(part); });
-  placed_ = true;
+      true, false, [&](Slots part, Evaluated<double>&) { place(q, part); }, [&](Slots part, Evaluated<double>&) { forces(part); });
+  valid_.placements = true;
   find_potentials(q);
 }
 
 /// Where branches share rows an evaluation leaves the placements of the last it met.
 template <bool kEffects>
 void TreeSweeps<kEffects>::place_all() {
-  if (placed_) return;
+  if (valid_.placements) return;
   placement_map(model_.tree, *constants_, *q_, work_.placement);
-  placed_ = true;
+  valid_.placements = true;
 }
 
 /// Positions of some joints, and what depends on positions alone.
@@ -102,14 +81,14 @@ void TreeSweeps<kEffects>::arrive_down(Slots part, State<double>& state) {
   place(state.q, part);
 }
 
-/// Forces on some joints and momenta there; seen: seen_ of the step that ends.
+/// Forces on some joints and momenta there; found: those of the step that ends are there.
 template <bool kEffects>
-void TreeSweeps<kEffects>::arrive_up(Slots part, double h, bool seen, State<double>& state) {
+void TreeSweeps<kEffects>::arrive_up(Slots part, double h, bool found, State<double>& state) {
   forces(part);
-  if (seen) {
-    momentum_end_map(model_.tree, h, work_.increment, work_.force, part, state.p);
+  if (found) {
+    momentum_end_map(model_.tree, h, work_.end_momentum, work_.force, part, state.p);
   } else {
-    momentum_update_map(model_.tree, *constants_, h, work_.displacement, work_.impulse, left(), work_.force, part, state.p);
+    momentum_update_map(model_.tree, *constants_, h, work_.displacement, work_.impulse, joint_residual(), work_.force, part, state.p);
   }
 }
 
@@ -125,18 +104,18 @@ void TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
     advance(all_slots(model_.tree), state);
     for (const Mimic& mimic : mimics()) state.q(mimic.follower_q) = mimic.multiplier * state.q(mimic.leader_q) + mimic.offset;
   }
-  if (!seen_) complete();
+  if (!valid_.end_momenta) complete();
   tree_.run(
-      true, false, [&](Slots part, Evaluated&) { arrive_down(part, state); },
-      [&](Slots part, Evaluated&) { arrive_up(part, h, seen_, state); });
-  placed_ = true;
+      true, false, [&](Slots part, Evaluated<double>&) { arrive_down(part, state); },
+      [&](Slots part, Evaluated<double>&) { arrive_up(part, h, valid_.end_momenta, state); });
+  valid_.placements = true;
   find_potentials(state.q);
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::apply(std::span<const double> force) {
   applied_.assign(force.begin(), force.end());
-  if (!has_gravity_) {
+  if (!strategy_.gravity) {
     for (double& value : work_.force.flat()) value = 0;
   }
 }
@@ -144,48 +123,47 @@ void TreeSweeps<kEffects>::apply(std::span<const double> force) {
 template <bool kEffects>
 void TreeSweeps<kEffects>::forces(Slots part) {
   const Tree& tree = model_.tree;
-  if (has_gravity_) gravity_force_up(tree, *constants_, work_.placement, work_.field, part, work_.first_moment, work_.force);
+  if (strategy_.gravity) gravity_force_up(tree, *constants_, work_.placement, work_.field, part, work_.first_moment, work_.force);
   if (applied_.empty()) return;
   const Slots rows = velocities(tree, part);
   for (Index row = rows.begin; row < rows.end; ++row) {
     const double applied = applied_[static_cast<std::size_t>(row)];
-    work_.force(row) = has_gravity_ ? work_.force(row) + applied : applied;
+    work_.force(row) = strategy_.gravity ? work_.force(row) + applied : applied;
   }
 }
 
-/// motions(part) brings work_.motion up to date on the way down; before_up(part, sum) comes first on the way up. first: of a solve, else
-/// of a correction.
+/// motions(part) brings work_.motion up to date on the way down; before_up(part, sum) comes first on the way up.
 template <bool kEffects>
 template <class Motions, class BeforeUp>
-Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions,
+Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pass pass, Factor factor, const Motions& motions,
                                                  const BeforeUp& before_up) {
   report.evaluations += 1;
-  if (fresh) report.factorisations += 1;
-  Evaluated now;
-  const auto move = [&](Slots part, Evaluated& sum) {
+  if (factor == Factor::fresh) report.factorisations += 1;
+  Evaluated<double> now;
+  const auto move = [&](Slots part, Evaluated<double>& sum) {
     motions(part);
     const double least = displacement_down(model_.tree, work_.placement, work_.motion, part, work_.displacement);
     sum.least_w = std::min(sum.least_w, least);
   };
-  const auto momenta = [&](Slots part, Evaluated& sum) {
+  const auto momenta = [&](Slots part, Evaluated<double>& sum) {
     sum.energy += momentum_map(model_.tree, *constants_, work_.displacement, part, work_.impulse);
   };
-  const auto down = [&](Slots part, Evaluated& sum) {
+  const auto down = [&](Slots part, Evaluated<double>& sum) {
     move(part, sum);
     momenta(part, sum);
   };
-  if (!kEffects && one_pass_) {
-    complete_ = !shares_rows_;
-    seen_ = !fresh && (shares_rows_ || is_long_chain_);
-    placed_ = !shares_rows_;
-    const auto up = [&](Slots part, Evaluated& sum) {
+  if (!kEffects && strategy_.one_pass) {
+    valid_.evaluation = !strategy_.shares_rows;
+    valid_.end_momenta = factor == Factor::kept && strategy_.finds_end_momenta();
+    valid_.placements = !strategy_.shares_rows;
+    const auto up = [&](Slots part, Evaluated<double>& sum) {
       before_up(part, sum);
-      sum.norm += pass_part(part, fresh, NothingAdded{});
-      if (seen_) {
-        momentum_seen_map(model_.tree, *constants_, work_.displacement, work_.impulse, work_.innovation, part, work_.increment);
+      sum.norm += pass_part(part, factor, NothingAdded{});
+      if (valid_.end_momenta) {
+        momentum_at_end_map(model_.tree, *constants_, work_.displacement, work_.impulse, work_.innovation, part, work_.end_momentum);
       }
     };
-    if (is_long_chain_) {
+    if (strategy_.order == Order::long_chain) {
       // momenta on the way up, where a factor reads inertias and displacements too; of a part its parent's, to which it adds, and not its
       // last, which it had from the part before
       const Slots all = all_slots(model_.tree);
@@ -196,7 +174,7 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first,
       });
     } else {
       // a correction begins where the pass before it ended: what that left is still in the cache
-      now = tree_.run(first, shares_rows_, down, up);
+      now = tree_.run(pass == Pass::first, strategy_.shares_rows, down, up);
     }
     now.scale = now.energy;
     return now;
@@ -205,25 +183,25 @@ Evaluated TreeSweeps<kEffects>::evaluate_motions(StepReport& report, bool first,
   before_up(all_slots(model_.tree), now);
   now.scale = now.energy;
   act(now);
-  pass_up(now, fresh);
+  pass_up(now, factor);
   return now;
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::complete() {
-  if (complete_) return;
+  if (valid_.evaluation) return;
   const Slots all = all_slots(model_.tree);
   place_all();
   motion_map(model_.tree, *constants_, work_.delta, work_.motion);
   displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
   momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
   innovation_up(model_.tree, *constants_, all, work_);
-  complete_ = true;
+  valid_.evaluation = true;
 }
 
 /// Effects on bodies and joints, for the displacements of an evaluation.
 template <bool kEffects>
-void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated& now) {
+void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated<double>& now) {
   if constexpr (kEffects) {
     const EffectPlan& plan = effects_.plan();
     if (plan.bodies) {
@@ -293,43 +271,43 @@ void TreeSweeps<kEffects>::tie(const Gains<double>& gains, const Down& down) {
       [&](Index i) { return tied_load(model_.tree, *constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
 }
 
-/// Residual and first half of a solve of some joints; fresh: with a factor made on the way.
+/// Residual and first half of a solve of some joints; a fresh factor is made on the way.
 template <bool kEffects>
 template <class Added>
-double TreeSweeps<kEffects>::pass_part(Slots part, bool fresh, const Added& added) {
-  if (fresh) {
+double TreeSweeps<kEffects>::pass_part(Slots part, Factor factor, const Added& added) {
+  if (factor == Factor::fresh) {
     newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains(), added);
   }
   return innovation_up(model_.tree, *constants_, part, work_);
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::pass_up(Evaluated& now, bool fresh) {
-  if (one_pass_) {
+void TreeSweeps<kEffects>::pass_up(Evaluated<double>& now, Factor how) {
+  if (strategy_.one_pass) {
     now.norm = 0;
     return effects_.with_added([&](const auto& added) {
-      in_parts_up(all_slots(model_.tree), [&](Slots part) { now.norm += pass_part(part, fresh, added); });
+      in_parts_up(all_slots(model_.tree), [&](Slots part) { now.norm += pass_part(part, how, added); });
     });
   }
-  if (fresh) factor();
+  if (how == Factor::fresh) factor();
   now.plain = residual_up(model_.tree, *constants_, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
   fold_mimics(ties_.mimics(), work_.residual);
   now.norm = pass_residual();
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::factor_again(Evaluated& now, StepReport& report) {
+void TreeSweeps<kEffects>::factor_again(Evaluated<double>& now, StepReport& report) {
   complete();
-  seen_ = false;
+  valid_.end_momenta = false;
   report.factorisations += 1;
-  if (!one_pass_) {
+  if (!strategy_.one_pass) {
     factor();
     now.norm = pass_residual();
     return;
   }
   momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
   act(now);
-  pass_up(now, true);
+  pass_up(now, Factor::fresh);
 }
 
 /// Ties between joints make the whole solve necessary for the norm.
@@ -358,72 +336,72 @@ void TreeSweeps<kEffects>::pass_down() {
 /// Placements of some bodies where the rows hold another branch's.
 template <bool kEffects>
 void TreeSweeps<kEffects>::place_again(Slots part) {
-  if (shares_rows_ && part.branch > 0) placement_map(model_.tree, *constants_, *q_, part, work_.placement);
+  if (strategy_.shares_rows && part.branch > 0) placement_map(model_.tree, *constants_, *q_, part, work_.placement);
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::evaluate(bool fresh, StepReport& report) {
+Evaluated<double> TreeSweeps<kEffects>::evaluate(Factor factor, StepReport& report) {
   const auto motions = [&](Slots part) {
     place_again(part);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  return evaluate_motions(report, true, fresh, motions, nothing);
+  return evaluate_motions(report, Pass::first, factor, motions, nothing);
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::evaluate_from(const State<double>& state, const Extrapolation& guess, double h, bool fresh,
+Evaluated<double> TreeSweeps<kEffects>::evaluate_from(const State<double>& state, const Extrapolation& guess, double h, Factor factor,
                                                 StepReport& report) {
   const auto motions = [&](Slots part) {
     place_again(part);
     extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  const auto target = [&](Slots part, Evaluated&) { momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target); };
-  return evaluate_motions(report, true, fresh, motions, target);
+  const auto target = [&](Slots part, Evaluated<double>&) { momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target); };
+  return evaluate_motions(report, Pass::first, factor, motions, target);
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h,
-                                                    bool fresh, StepReport& report) {
+Evaluated<double> TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h,
+                                                            Factor factor, StepReport& report) {
   const auto motions = [&](Slots part) {
     arrive_down(part, state);
     extrapolate(guess, state.history, velocities(model_.tree, part), work_.delta);
     motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
   };
-  const auto arrival = [&](Slots part, Evaluated&) {
+  const auto arrival = [&](Slots part, Evaluated<double>&) {
     arrive_up(part, h_before, true, state);
     momentum_target_map(model_.tree, h, state.p, work_.force, part, work_.momentum_target);
   };
-  const Evaluated now = evaluate_motions(report, true, fresh, motions, arrival);
+  const Evaluated<double> now = evaluate_motions(report, Pass::first, factor, motions, arrival);
   find_potentials(state.q);
   return now;
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
+Evaluated<double> TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
   const auto motions = [&](Slots part) {
     place_again(part);
     correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
   };
-  return evaluate_motions(report, false, false, motions, nothing);
+  return evaluate_motions(report, Pass::correction, Factor::kept, motions, nothing);
 }
 
 template <bool kEffects>
-Evaluated TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
+Evaluated<double> TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
   report.iterations += 1;
-  if (!one_pass_) {
+  if (!strategy_.one_pass) {
     if (ties_.empty()) pass_down();  // with ties, pass_up has solved already
     std::swap(work_.increment, work_.applied);
     return correct(1, report);
   }
   const auto motions = [&](Slots part) {
     place_again(part);
-    if (shares_rows_ && part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
+    if (strategy_.shares_rows && part.branch > 0) motion_map(model_.tree, *constants_, work_.delta, part, work_.motion);
     increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, part, work_.variation,
                    work_.applied);
     correct_motion_map(model_.tree, *constants_, work_.applied, 1.0, part, work_.delta, work_.motion);
   };
-  return evaluate_motions(report, false, false, motions, nothing);
+  return evaluate_motions(report, Pass::correction, Factor::kept, motions, nothing);
 }
 
 /// The residual along a correction.
@@ -447,12 +425,10 @@ double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before)
 }
 
 template <bool kEffects>
-bool TreeSweeps<kEffects>::at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons) {
-  if (!(0.5 * norm <= kFloorCeiling * kFloorCeiling * (now.energy + fall))) return false;
+bool TreeSweeps<kEffects>::at_floor(const Evaluated<double>& now, double fall, double epsilons) {
+  if (!below_ceiling(now.norm, now.energy, fall)) return false;
   complete();
-  const double sum = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields());
-  const double unit = epsilons * std::numeric_limits<double>::epsilon();
-  return norm <= unit * unit * sum;
+  return is_rounding(now.norm, rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields()), epsilons);
 }
 
 /// h x momenta at the beginning of a step of displacement work_.delta from where the bodies are; returns h^2 x its kinetic energy.
@@ -476,15 +452,15 @@ EnergyStep TreeSweeps<kEffects>::energy_step(const Field<double>& before, double
   Field<double>& solution = work_.applied;
   std::ranges::copy(work_.delta.flat(), solution.flat().begin());
   const auto along_mean = [&](double momentum, Index row) { return 0.5 * momentum * (solution(row) / h + before(row) / h_before); };
-  step.now = momenta_of_delta(work_.increment) / (h * h);
-  for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.increment(row) / h, row);
+  step.now = momenta_of_delta(work_.momentum) / (h * h);
+  for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.momentum(row) / h, row);
   // the step before, seen from its end: the same step taken back, whose momenta point the other way
   for (Index row = 0; row < before.rows(); ++row) work_.delta(row) = -before(row);
-  step.before = momenta_of_delta(work_.increment) / (h_before * h_before);
-  for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.increment(row) / h_before, row);
+  step.before = momenta_of_delta(work_.momentum) / (h_before * h_before);
+  for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.momentum(row) / h_before, row);
   // all as it was
   std::ranges::copy(solution.flat(), work_.delta.flat().begin());
-  evaluate(false, report);
+  evaluate(Factor::kept, report);
   return step;
 }
 
@@ -539,8 +515,8 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
     if (given) {
       effects_.given_velocities(given_);
       spread_mimics<double>(ties_.mimics(), given_);
-      momentum_of(given_, work_.increment);
-      for (Index row = 0; row < read_.rows(); ++row) read_(row) -= work_.increment(row);
+      momentum_of(given_, work_.momentum);
+      for (Index row = 0; row < read_.rows(); ++row) read_(row) -= work_.momentum(row);
     }
     effects_.with_reading([&](const auto& added) { factor_mass(added); });
     apply_mass_inverse(read_, v);

@@ -23,10 +23,12 @@
 #include <span>
 #include <vector>
 
-#include "engine/effects/effect_sweeps.hpp"
+#include "engine/effects/no_effects.hpp"
 #include "engine/guess/extrapolation.hpp"
 #include "engine/options.hpp"
+#include "engine/solve/judge.hpp"
 #include "engine/step_report.hpp"
+#include "engine/sweeps/strategy.hpp"
 #include "engine/sweeps/down_and_up.hpp"
 #include "kernels/tree/articulated.hpp"
 #include "kernels/tree/mimic.hpp"
@@ -34,25 +36,13 @@
 
 namespace linden {
 
-struct Evaluated {
-  double least_w = 1;  // see displacement_down
-  double energy = 0;   // h^2 x kinetic energy of the mean motion
-  double plain = 0;    // |h r|^2
-  double norm = 0;     // squared energy norm of the residual
-  double scale = 0;    // what a residual is compared with: energy, with effects also what gravity gives in a step
-  bool usable() const { return least_w > 0 && std::isfinite(norm) && std::isfinite(plain) && std::isfinite(energy); }
-  /// What another part of the tree adds.
-  void add(const Evaluated& part) {
-    least_w = std::min(least_w, part.least_w);
-    energy += part.energy;
-    norm += part.norm;
-  }
-};
-
 /// Kinetic energies of the mean motions of two neighbouring steps, and the work of the impulses between them [J].
 struct EnergyStep {
   double before = 0, now = 0, work = 0;
 };
+
+/// With which factor an evaluation's residual is to be solved.
+enum class Factor : std::uint8_t { fresh, kept };
 
 /// kEffects: with those of the plan, beside gravity.
 template <bool kEffects>
@@ -73,7 +63,7 @@ class TreeSweeps {
   /// The same at the end of a step of h, whose displacement joins the history: positions, momenta.
   void arrive(double h, State<double>& state);
   /// Whether the end of a step whose last evaluation this was and the first evaluation of the next can go over each branch together.
-  bool can_go_on() const { return seen_; }
+  bool can_go_on() const { return valid_.end_momenta; }
   /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
   double potential() const { return potential_; }
   double effect_potential() const { return effect_potential_; }
@@ -83,27 +73,26 @@ class TreeSweeps {
 
   /// Before all else of a step from these positions, which must stay where they are until it is over.
   void start(const Field<double>& q) { q_ = &q; }
-  /// Before the evaluations of a step with effects. scale: see Evaluated.
+  /// Before the evaluations of a step with effects. scale: what Evaluated::scale gets beside the energy.
   void begin(double scale);
-  /// fresh: with a fresh factor, else with the one there is; see holds.
-  Evaluated evaluate(bool fresh, StepReport& report);
+  Evaluated<double> evaluate(Factor factor, StepReport& report);
   /// The same from a guess of delta, momentum_target and all.
-  Evaluated evaluate_from(const State<double>& state, const Extrapolation& guess, double h, bool fresh, StepReport& report);
+  Evaluated<double> evaluate_from(const State<double>& state, const Extrapolation& guess, double h, Factor factor, StepReport& report);
   /// arrive at the end of the step before, of h_before, and evaluate_from there, both while a branch is in the cache; see can_go_on.
-  Evaluated arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h, bool fresh,
-                                StepReport& report);
+  Evaluated<double> arrive_and_evaluate(double h_before, State<double>& state, const Extrapolation& guess, double h, Factor factor,
+                                        StepReport& report);
   /// Placements, motions, displacements and impulses of all bodies: where branches share rows an evaluation leaves those of the last it met.
   void complete();
   /// A fresh factor for the evaluation made last.
-  void factor_again(Evaluated& now, StepReport& report);
+  void factor_again(Evaluated<double>& now, StepReport& report);
   /// The evaluation after a correction by what the factor makes of the residual.
-  Evaluated solve_and_correct(StepReport& report);
+  Evaluated<double> solve_and_correct(StepReport& report);
   /// The evaluation after the correction applied last, times `factor`.
-  Evaluated correct(double factor, StepReport& report);
+  Evaluated<double> correct(double factor, StepReport& report);
 
   /// The residual of each joint as its solve left it [kg m^2, kg m]; with no ties, the innovation.
-  Field<double>& left() { return one_pass_ ? work_.innovation : work_.residual; }
-  const Field<double>& left() const { return one_pass_ ? work_.innovation : work_.residual; }
+  Field<double>& joint_residual() { return strategy_.one_pass ? work_.innovation : work_.residual; }
+  const Field<double>& joint_residual() const { return strategy_.one_pass ? work_.innovation : work_.residual; }
   /// d^-1 of each joint, of one that is tied that of its coordinate: how far an impulse moves it.
   const Field<double>& yields() { return ties_.empty() ? work_.joint_inverse : ties_.yields(work_.joint_inverse); }
   /// Whether slopes along corrections are known: by Newton's method with its energy norm.
@@ -114,16 +103,16 @@ class TreeSweeps {
   double slope_at_end(const Field<double>& innovation_before) const {
     return ties_.empty() ? slope_along(innovation_before) : along(work_.applied);
   }
-  /// Whether a residual of this squared energy norm is rounding alone: epsilons of the impulses that meet at each joint, and small
-  /// beside the motion, or beside what gravity alone would do to it where all is at rest (fall).
-  bool at_rounding_floor(const Evaluated& now, double norm, double fall, double epsilons);
+  /// Whether the residual is rounding alone: epsilons of the impulses that meet at each joint, and small beside the motion, or beside what
+  /// gravity alone would do to it where all is at rest (fall).
+  bool at_floor(const Evaluated<double>& now, double fall, double epsilons);
   /// What the step solved last, of h, does to the energy of the step before, of h_before and with the displacement `before`. Between the
   /// two acts an impulse, whatever it is made of: the momentum at the beginning of the one less that at the end of the other, which are
   /// made anew from their displacements. It works along the mean of both velocities, to second order.
   EnergyStep energy_step(const Field<double>& before, double h_before, double h, StepReport& report);
 
   /// Whether the factor outlasts a step: reading velocities then has one of its own.
-  bool holds() const { return holds_; }
+  bool reuses_factor() const { return strategy_.reuses_factor; }
   /// The factor: part of a checkpoint where it outlasts a step.
   std::array<std::span<double>, 3> factor_memory() {
     return {work_.gain_up.flat(), work_.gain_down.flat(), work_.joint_inverse.flat()};
@@ -145,20 +134,29 @@ class TreeSweeps {
   }
 
  private:
+  /// What the rows of the workspace hold. Between steps: placements of all bodies.
+  struct Valid {
+    bool placements = true;    // of all bodies; where branches share rows, those of the last
+    bool evaluation = true;    // motions, displacements and impulses of all bodies, likewise
+    bool end_momenta = false;  // momenta at the end of the step, of the evaluation made last
+  };
+
   void place(const Field<double>& q, Slots part);
   void place_all();
   void place_again(Slots part);
   void find_potentials(const Field<double>& q);
   void advance(Slots part, State<double>& state);
   void arrive_down(Slots part, State<double>& state);
-  void arrive_up(Slots part, double h, bool seen, State<double>& state);
+  void arrive_up(Slots part, double h, bool found, State<double>& state);
+  /// Whether an evaluation begins a solve, or goes on where the pass before it ended.
+  enum class Pass : std::uint8_t { first, correction };
   template <class Motions, class BeforeUp>
-  Evaluated evaluate_motions(StepReport& report, bool first, bool fresh, const Motions& motions, const BeforeUp& before_up);
+  Evaluated<double> evaluate_motions(StepReport& report, Pass pass, Factor factor, const Motions& motions, const BeforeUp& before_up);
   template <class Added>
-  double pass_part(Slots part, bool fresh, const Added& added);
-  void act(Evaluated& now);
+  double pass_part(Slots part, Factor factor, const Added& added);
+  void act(Evaluated<double>& now);
   void forces(Slots part);
-  void pass_up(Evaluated& now, bool fresh);
+  void pass_up(Evaluated<double>& now, Factor how);
   void factor();
   template <class Added>
   void factor_mass(const Added& added);
@@ -173,20 +171,15 @@ class TreeSweeps {
   double slope_along(const Field<double>& innovation_before) const;
   double along(const Field<double>& correction) const;
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
-  Gains<double> mass_gains() { return holds_ ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
+  Gains<double> mass_gains() { return strategy_.reuses_factor ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
 
   const Model& model_;
   const BodyConstants<double>* constants_;
   Options options_;
-  bool has_gravity_;
-  bool one_pass_, holds_;
-  bool shares_rows_ = false;  // branches do, see Slots
-  bool is_long_chain_ = false;
-  bool complete_ = true;      // see complete()
-  bool placed_ = true;        // placements of all bodies are there; so between steps
+  Strategy strategy_;
+  Valid valid_;
   const Field<double>* q_ = nullptr;  // see start
-  bool seen_ = false;         // increment holds the momenta of the evaluation made last, seen from the end of the step
   double potential_ = 0, effect_potential_ = 0;
   double effect_scale_ = 0;
   bool guess_points_ = false;  // no evaluation of this solve has been made yet
@@ -194,7 +187,7 @@ class TreeSweeps {
   Workspace<double> work_;
   MimicTies<double> ties_;
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
-  DownAndUp<Evaluated> tree_;
+  DownAndUp<Evaluated<double>> tree_;
   Field<double> read_;  // see read_velocity
   Field<double> given_;  // velocities of joints whose motion is given; no rows without
   MassFactor<double> mass_;  // empty where nothing is held

@@ -3,7 +3,7 @@
 //
 //   momentum_target_map  h (p^k + h/2 Q^k)                                   what h mu must sum up to
 //   momentum_update_map  p^k+1 = (S^T Ad_{dT_i}^T h F_i - C h r) / h + h/2 Q^k+1,    C = Ad_{dT}^T on the joint's rows
-//   momentum_seen_map    h (p^k+1 - h/2 Q^k+1), while F and dT are at hand; momentum_end_map: the rest
+//   momentum_at_end_map    h (p^k+1 - h/2 Q^k+1), while F and dT are at hand; momentum_end_map: the rest
 //
 // The momentum of body j seen from the end of the step, nu_j = Ad_{exp(hV_j)}^T mu_j = dlog_{-hV_j}^T G_j V_j, is the same wrench in
 // space as mu_j; so is its sum over a subtree, and F_i of the last evaluation has only to be seen from where body i is now. No second
@@ -40,7 +40,7 @@ void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum,
 }
 
 template <class S, class Element>
-void momentum_seen_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 7>& displacement,
+void momentum_at_end_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 7>& displacement,
                        const Field<S, 6>& impulse, const Field<S>& residual, Slots slots, Field<S>& seen) {
   stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {

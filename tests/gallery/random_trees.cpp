@@ -126,7 +126,7 @@ void invariants(Report& report) {
   }
   report.at_most("trees that failed though their velocities are known to 1e-6", failed_known, 0, "every step has a solution");
   report.at_most("residual, relative", residual.value, 1e-6,
-                 "no step is taken above the ceiling of the floor of rounding (convergence.hpp)");
+                 "no step is taken above the ceiling of the floor of rounding (judge.hpp)");
   report.at_most("way back off / (the solver's tolerance and a hundred times what rounding leaves unknown, as a random walk)",
                  back.value, 1,
                  "the step is its own inverse; 1e-14 of the energy's root may be off, all of it the lightest body's");

@@ -182,7 +182,7 @@ void beyond_steps(Report& report) {
                             off));
   }
   report.at_most("energy error where no step was split or refused", silent, 0.25,
-                 "a step that gains a quarter is refused (convergence.hpp)");
+                 "a step that gains a quarter is refused (judge.hpp)");
 }
 
 }  // namespace

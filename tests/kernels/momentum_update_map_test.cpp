@@ -73,7 +73,7 @@ TEST_CASE("the update in two halves is the update") {
     update.run(rig);
     const VectorXd at_once = vector(rig.state.p);
     const Slots all = all_slots(rig.tree);
-    momentum_seen_map(rig.tree, rig.constants, rig.work.displacement, rig.work.impulse, rig.work.residual, all, rig.work.increment);
+    momentum_at_end_map(rig.tree, rig.constants, rig.work.displacement, rig.work.impulse, rig.work.residual, all, rig.work.increment);
     momentum_end_map(rig.tree, rig.h, rig.work.increment, rig.work.force, all, rig.state.p);
     INFO(model.names.model);
     CHECK(relative_error(vector(rig.state.p), at_once) < 1e-13);

@@ -1,4 +1,4 @@
-// engine/sweeps/lanes_of.hpp
+// kernels/values/lanes_of.hpp
 // A register of W instances, or one number, lane by lane.
 #pragma once
 

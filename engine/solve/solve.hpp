@@ -1,0 +1,182 @@
+// engine/solve/solve.hpp
+// Solves the equation of a step, for one tree or for a block of instances: evaluates, judges (judge.hpp), decides (decide.hpp), does what
+// was decided, until nobody is left. Who is solved or given up waits for the others.
+//
+// Sweeps run what is decided, over their own order of memory:
+//
+//   Number, kLanes, kAlone                      double or a pack; how many instances; whether one can cut, take back, refactor, continue
+//   evaluate(lanes, corrections)                corrects the displacement of these lanes, the others' stays; the next evaluation of all
+//   converged(now), close(now)                  lanes whose residual is below the tolerance; nearly so
+//   at_floor(now, epsilons)                     lanes whose residual is rounding alone
+//   has_states(), revise(revision)              effects that stick, stop or saturate: lanes in which a state changed
+//   first_correction(now, before, floor)        told once, what the first correction left
+//   stale(norm, before)                         whether the factor that was held for it will do
+//   refused(lanes)                              of lanes that are solved those that cannot take the step in one
+//   settle(done, before, active)                these lanes are solved, those were before, others go on with what all share
+//   and alone: cut(share), take_back(share), refactor(now), continuation(now, whole), give_up(seen)
+#pragma once
+
+#include <array>
+
+#include "engine/effects/revision.hpp"
+#include "engine/solve/decide.hpp"
+#include "engine/solve/judge.hpp"
+
+namespace linden {
+
+template <class S>
+struct Solved {
+  Lanes done = 0, lost = 0;
+  S least_w = S(1.0);                                // of those done, see displacement_down
+  std::array<int, LanesOf<S>::count> evaluations{};  // until an instance was done or lost
+};
+
+template <class Sweeps>
+class Solve {
+ public:
+  using S = typename Sweeps::Number;
+  using L = LanesOf<S>;
+  static constexpr int W = L::count;
+
+  Solve(Sweeps& sweeps, const Policy& policy) : sweeps_(sweeps), policy_(policy) {}
+
+  /// now: the evaluation of the first guess; fresh: lanes in which it made the factor.
+  Solved<S> run(Lanes active, Evaluated<S> now, Lanes fresh) {
+    now_ = now;
+    fresh_ = fresh;
+    Solved<S> solved;
+    solved.evaluations.fill(1);
+    if (!policy_.judges_guess) correct(active, active, solved);
+    for (;;) {
+      std::array<Lanes, kNexts> next = decided(active);
+      const Lanes refused = sweeps_.refused(lanes_to(next, Next::accept));
+      const Lanes done = lanes_to(next, Next::accept) & ~refused, lost = lanes_to(next, Next::give_up) | refused;
+      solved.least_w = select(L::mask(done), now_.least_w, solved.least_w);
+      solved.done |= done;
+      solved.lost |= lost;
+      active &= ~(done | lost);
+      sweeps_.settle(done, solved.done & ~done, active);
+      if (active == 0) return solved;
+      if constexpr (Sweeps::kAlone) {
+        if (next[static_cast<std::size_t>(Next::correct)] == 0) {
+          act_alone(next);
+          continue;
+        }
+      }
+      correct(active, lanes_to(next, Next::correct), solved);
+      for (int l = 0; l < W; ++l) updates_[at(l)] += static_cast<int>(lanes_to(next, Next::update_states) >> l & 1u);
+    }
+  }
+
+  /// The evaluation made last, and what was seen of the last lane that was decided about.
+  const Evaluated<S>& now() const { return now_; }
+  const Seen& seen() const { return seen_; }
+
+ private:
+  static constexpr std::size_t at(int lane) { return static_cast<std::size_t>(lane); }
+  static Lanes lanes_to(const std::array<Lanes, kNexts>& next, Next what) { return next[static_cast<std::size_t>(what)]; }
+
+  /// What happens next to each lane.
+  std::array<Lanes, kNexts> decided(Lanes active) {
+    const Lanes usable = L::bits(linden::usable(now_)), fell = L::bits(now_.norm < before_), whole = corrected_ & ~cut_;
+    slow_ = (slow_ & ~whole) | (whole & ~L::bits(fell_fast(now_.norm, before_)));
+    const Lanes converged = usable & sweeps_.converged(now_);
+    const Lanes at_floor = floor(active & usable & ~converged, whole), solved = converged | at_floor;
+    if (whole != 0 && corrections_ == 1) sweeps_.first_correction(now_.norm, before_, at_floor != 0);
+    const Lanes changed = revised(active & usable & ~(cut_ & ~fell), solved);
+    const bool stale = corrections_ == 1 && corrected_ != 0 && sweeps_.stale(now_, before_);
+    std::array<Lanes, kNexts> next{};
+    for (int l = 0; l < W; ++l) {
+      if ((active >> l & 1u) == 0) continue;
+      const auto is = [l](Lanes lanes) { return (lanes >> l & 1u) != 0; };
+      seen_ = {is(usable), is(solved), is(at_floor), is(changed), is(corrected_), is(taken_back_), is(fell), is(slow_), stale, is(fresh_),
+               corrections_, cuts_, updates_[at(l)]};
+      const Next what = decide(policy_, seen_);
+      next[static_cast<std::size_t>(what)] |= 1u << l;
+      if constexpr (Sweeps::kAlone) {
+        if (what == Next::give_up) sweeps_.give_up(seen_);
+      }
+    }
+    if ((corrected_ & (fell | solved)) != 0) fresh_ = 0;
+    return next;
+  }
+
+  /// Which of these lanes are at the floor of rounding, as far as it is asked.
+  Lanes floor(Lanes lanes, Lanes whole) {
+    Lanes stalled = lanes;
+    if (policy_.floor_test != FloorTest::always) stalled &= (whole & slow_) | taken_back_;
+    Lanes found = stalled != 0 ? stalled & sweeps_.at_floor(now_, kFloorEpsilons) : 0;
+    if (policy_.floor_test != FloorTest::also_when_close) return found;
+    const Lanes near = lanes & whole & ~slow_ & sweeps_.close(now_);
+    if (near != 0) found |= near & sweeps_.at_floor(now_, kBareRounding);
+    return found;
+  }
+
+  /// Which of these lanes have a state that is not that of the solution so far; it is changed.
+  Lanes revised([[maybe_unused]] Lanes lanes, [[maybe_unused]] Lanes solved) {
+    if (!sweeps_.has_states()) return 0;
+    Lanes late = 0, last = 0;
+    for (int l = 0; l < W; ++l) {
+      const int updates = updates_[at(l)];
+      const bool whole_tree = updates == policy_.first_continuation || updates == policy_.last_continuation;
+      if (whole_tree || updates >= policy_.most_updates) lanes &= ~(1u << l);
+      if (updates >= policy_.one_state_at_a_time) late |= 1u << l;
+      if (updates >= policy_.one_limit_at_a_time) last |= 1u << l;
+    }
+    if (lanes == 0) return 0;
+    const Lanes near = solved | (L::bits(within(now_.norm, as<S>(kSettled * kSettled), now_.scale)) & L::bits(linden::usable(now_)));
+    return lanes & sweeps_.revise({L::mask(near), L::mask(solved), L::mask(late), L::mask(last)});
+  }
+
+  /// The next evaluation; these lanes are corrected before it, the other active ones had a state changed.
+  void correct(Lanes active, Lanes lanes, Solved<S>& solved) {
+    before_ = now_.norm;
+    corrected_ = lanes;
+    cut_ = taken_back_ = 0;
+    cuts_ = 0;
+    share_ = 1;
+    if (lanes != 0) corrections_ += 1;
+    for (int l = 0; l < W; ++l) solved.evaluations[at(l)] += static_cast<int>(active >> l & 1u);
+    now_ = sweeps_.evaluate(lanes, corrections_);
+  }
+
+  /// Of a tree that is stepped alone: all but the next correction.
+  void act_alone(const std::array<Lanes, kNexts>& next) {
+    if constexpr (Sweeps::kAlone) {
+      if (lanes_to(next, Next::cut) != 0) {
+        share_ /= 2;
+        cut_ = 1;
+        cuts_ += 1;
+        now_ = sweeps_.cut(share_);
+      } else if (lanes_to(next, Next::take_back) != 0) {
+        corrected_ = cut_ = 0;
+        taken_back_ = 1;
+        now_ = sweeps_.take_back(share_);
+      } else {
+        corrected_ = cut_ = taken_back_ = 0;
+        if (lanes_to(next, Next::refactor) != 0) {
+          sweeps_.refactor(now_);
+        } else {
+          if (lanes_to(next, Next::continuation) != 0) {
+            sweeps_.continuation(now_, updates_[0] == policy_.last_continuation);
+          }
+          updates_[0] += 1;
+          now_ = sweeps_.evaluate(0, corrections_);
+        }
+        fresh_ = 1;
+      }
+    }
+  }
+
+  Sweeps& sweeps_;
+  const Policy& policy_;
+  Evaluated<S> now_;
+  S before_ = S(0.0);  // norm that the correction met
+  Seen seen_;
+  Lanes corrected_ = 0, cut_ = 0, taken_back_ = 0, slow_ = 0, fresh_ = 0;
+  int corrections_ = 0, cuts_ = 0;
+  std::array<int, W> updates_{};
+  double share_ = 1;  // of the correction that is tried
+};
+
+}  // namespace linden

@@ -1,0 +1,243 @@
+// engine/sweeps/lane_sweeps.hpp
+// The sweeps over a block of W instances of one tree that a step is made of, lane = instance, with the memory they share. `Pack` is a register
+// of W numbers, or one number; `kEffects` whether anything acts beside gravity. What a solution is, and what to do where there is none, is
+// not their business (engine/solve/solve.hpp).
+//
+//   start            start_down, newton_up            guess -> displacements, momenta; residual, Jacobian and its factor
+//   evaluate         correct_down                     second half of a solve, corrected displacements, momenta
+//                    innovation_up (or newton_up)     residual, first half of the next solve
+//   end              advance_down, momentum_up        new positions, placements, forces, momenta
+//
+// Without effects the Jacobian is factored to first order at the guess, exactly at every second correction, and what lanes that are done have
+// found is kept aside while others go on. With effects the factor is exact and fresh at every evaluation, so that lanes that wait for
+// others compute what they had, and what becomes of a lane whose effects change their state depends on itself alone.
+#pragma once
+
+#include <array>
+#include <limits>
+
+#include "engine/effects/lane_effects.hpp"
+#include "engine/solve/block_stepper.hpp"
+#include "engine/solve/judge.hpp"
+#include "engine/effects/revision.hpp"
+#include "kernels/block/advance_down.hpp"
+#include "kernels/block/lane_constants.hpp"
+#include "kernels/tree/articulated_inertia_up.hpp"
+#include "kernels/tree/innovation_up.hpp"
+#include "kernels/tree/momentum_update_map.hpp"
+#include "kernels/tree/rounding_floor_map.hpp"
+#include "layout/workspace.hpp"
+
+namespace linden {
+
+template <class Pack, bool kEffects>
+class LaneSweeps {
+ public:
+  using Real = typename ElementOf<Pack>::type;
+  using L = LanesOf<Pack>;
+  using Mask = typename L::Mask;
+  using Number = Pack;
+  static constexpr bool kAlone = false;
+
+  explicit LaneSweeps(const BlockSetup<Real>& setup)
+      : tree_(setup.model.tree), options_(setup.options), constants_(setup.constants), effects_(setup) {
+    const Shape& shape = tree_.shape;
+    work_.allocate(shape);
+    if constexpr (!kEffects) kept_.allocate(shape);
+    q_.allocate(shape.positions);
+    p_.allocate(shape.velocities);
+    applied_.allocate(shape.velocities);
+    has_gravity_ = options_.gravity != std::array<double, 3>{0, 0, 0};
+    gravity_ = {number(options_.gravity[0]), number(options_.gravity[1]), number(options_.gravity[2])};
+    const double tolerance = sizeof(Real) == sizeof(float) ? std::max(options_.tolerance, kSingleTolerance) : options_.tolerance;
+    tolerance_squared_ = number(tolerance * tolerance);
+    for (Field<Pack>* field : {&work_.delta, &work_.force, &work_.innovation}) std::ranges::fill(field->flat(), number(0));
+    std::ranges::fill(work_.impulse.flat(), number(0));
+    std::ranges::fill(work_.field.flat(), number(0));
+    set_motion_identity(work_.motion);
+    set_motion_identity(work_.displacement);
+    if constexpr (!kEffects) {
+      set_motion_identity(kept_.motion);
+      set_motion_identity(kept_.displacement);
+    }
+  }
+
+  static Pack number(double value) { return Pack(static_cast<Real>(value)); }
+
+  const BodyConstants<EachLane<Pack>>& constants() const { return constants_; }
+  Workspace<Pack>& work() { return work_; }
+  const Workspace<Pack>& work() const { return work_; }
+  auto& effects() { return effects_; }
+  Field<Pack>& q() { return q_; }
+  Field<Pack>& p() { return p_; }
+  /// Forces given from outside; null: none.
+  const Field<Pack>* applied() const { return has_applied_ ? &applied_ : nullptr; }
+
+  void load(const Block<Real>& block) {
+    const auto load_rows = [](const Real* from, Field<Pack>& to) {
+      for (Index row = 0; row < to.rows(); ++row) to(row) = L::load(from + row * L::count);
+    };
+    load_rows(block.q, q_);
+    load_rows(block.p, p_);
+    has_applied_ = block.applied != nullptr;
+    if (has_applied_) load_rows(block.applied, applied_);
+    constants_.use_masses(block.mass);
+    if constexpr (kEffects) effects_.load(block);
+  }
+  void store(const Block<Real>& block) {
+    for (Index row = 0; row < q_.rows(); ++row) L::store(q_(row), block.q + row * L::count);
+    for (Index row = 0; row < p_.rows(); ++row) L::store(p_(row), block.p + row * L::count);
+    if constexpr (kEffects) effects_.store(block);
+  }
+
+  /// Placements and forces of the positions as they are; returns the potential energy. The same instructions as at the end of a step, so
+  /// that it does not matter how many steps are taken in one go.
+  Pack refresh() {
+    advance(L::mask(0));
+    const Pack potential = update_momentum(L::mask(0));
+    if constexpr (kEffects) return potential + effects_.refresh(work_.placement, q_);
+    return potential;
+  }
+
+  void find_target() { momentum_target_map(tree_, number(options_.step), p_, work_.force, work_.momentum_target); }
+
+  /// The evaluation of the first guess in work().delta.
+  Evaluated<Pack> start([[maybe_unused]] const Block<Real>& block) {
+    if constexpr (kEffects) effects_.begin(block, options_.step, q_, work_);
+    const Evaluation<Pack> moved = start_down(tree_, constants_, work_);
+    if constexpr (kEffects) {
+      if (!effects_->plan().ground.points.empty()) effects_->guess_points(work_.displacement);
+    }
+    return evaluated<true>(moved, false);
+  }
+
+  // what solve.hpp asks
+  Evaluated<Pack> evaluate(Lanes corrected, int corrections) {
+    return evaluated<false>(correct_down(tree_, constants_, L::mask(corrected), work_), corrections % 2 == 0);
+  }
+  Lanes converged(const Evaluated<Pack>& now) const { return L::bits(within(now.norm, tolerance_squared_, now.scale)); }
+  Lanes close(const Evaluated<Pack>&) const { return 0; }
+  Lanes at_floor(const Evaluated<Pack>& now, double epsilons) const {
+    const Pack sum = rounding_floor_map(tree_, constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
+    return L::bits(below_ceiling(now.norm, now.energy, fall())) & L::bits(is_rounding(now.norm, sum, epsilons));
+  }
+  bool has_states() const {
+    if constexpr (kEffects) return effects_.plan().revises;
+    return false;
+  }
+  Lanes revise([[maybe_unused]] const Revision<Mask>& revision) {
+    if constexpr (kEffects) return L::bits(effects_->revise(work_.innovation, revision, work_.delta));
+    return 0;
+  }
+  void first_correction(const Pack&, const Pack&, bool) const {}
+  bool stale(const Evaluated<Pack>&, const Pack&) const { return false; }
+  Lanes refused([[maybe_unused]] Lanes lanes) const {
+    if constexpr (kEffects) return lanes != 0 ? lanes & effects_.blows(q_, work_.delta) : 0;
+    return 0;
+  }
+  void settle([[maybe_unused]] Lanes done, [[maybe_unused]] Lanes before, [[maybe_unused]] Lanes active) {
+    if constexpr (!kEffects) {
+      if (active == 0 && before != 0) bring_back(before);
+      if (active != 0 && done != 0) keep(done);
+    }
+  }
+
+  /// The end of a step in these lanes, whose displacement in coordinates is in work().delta.
+  void end([[maybe_unused]] const Block<Real>& block, Lanes done) {
+    const Mask moves = L::mask(done);
+    if constexpr (kEffects) effects_.end(block, done, work_);
+    advance(moves);
+    update_momentum(moves);
+    if constexpr (kEffects) {
+      effects_.add_end(constants_, moves, work_, p_);
+      effects_.refresh(work_.placement, q_);
+    }
+  }
+
+  /// M^-1 of what is on the right.
+  [[gnu::noinline]] void solve_mass(const Field<Pack>& right_side, Field<Pack>& rate) {
+    effects_->with_rotors([&](const auto& rotors) { factor_mass(rotors); });
+    apply_mass_inverse(right_side, rate);
+  }
+  /// Velocities that the momenta are read as, in work().increment.
+  void read_velocity() {
+    if constexpr (kEffects) {
+      effects_->begin_reading(p_);
+      effects_->with_reading([&](const auto& added) { factor_mass(added); });
+      apply_mass_inverse(p_, work_.increment);
+    } else {
+      solve_mass(p_, work_.increment);
+    }
+  }
+
+ private:
+  /// Of a screw's motion the sweeps of a block write three numbers of seven.
+  static void set_motion_identity(Field<Pack, 7>& motion) {
+    for (Index i = 0; i < motion.rows(); ++i) {
+      for (int k = 0; k < 7; ++k) motion(i, k) = number(k == 3 ? 1 : 0);
+    }
+  }
+
+  Gains<Pack> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+
+  /// The upward half; kFirst: of the guess.
+  template <bool kFirst>
+  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, [[maybe_unused]] bool exact) {
+    Evaluated<Pack> now{.least_w = moved.least_w, .energy = moved.energy};
+    if constexpr (kEffects) {
+      now.norm = effects_.act(constants_, work_, now.energy);
+      now.scale = now.energy + fall();
+    } else {
+      if constexpr (kFirst) {
+        now.norm = newton_up<true>(tree_, constants_, work_);
+      } else {
+        now.norm = exact ? newton_up<false>(tree_, constants_, work_) : innovation_up(tree_, constants_, work_);
+      }
+      now.scale = now.energy;
+    }
+    return now;
+  }
+
+  Pack fall() const { return number(fall_per_mass(options_.gravity, options_.step)) * constants_.subtree_mass(0); }
+
+  void advance(const Mask& moves) { advance_down(tree_, constants_, has_gravity_ ? &gravity_ : nullptr, moves, work_, q_); }
+  Pack update_momentum(const Mask& moves) {
+    return momentum_up(tree_, constants_, has_gravity_, number(options_.step), moves, applied(), work_, p_);
+  }
+
+  template <class Added>
+  [[gnu::noinline]] void factor_mass(const Added& added) {
+    articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, gains(), added);
+  }
+  [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
+    impulse_pass_up(tree_, constants_, work_.placement, gains(), right_side, work_.bias, work_.innovation);
+    rate_down(tree_, constants_, work_.placement, gains(), work_.innovation, work_.variation, rate);
+  }
+
+  [[gnu::noinline]] void keep(Lanes lanes) { blend(kept_, work_, L::mask(lanes)); }
+  [[gnu::noinline]] void bring_back(Lanes lanes) { blend(work_, kept_, L::mask(lanes)); }
+  template <class To, class From>
+  static void blend(To& to, const From& from, const Mask& lanes) {
+    const auto each = [&](auto& target, const auto& source) {
+      for (std::size_t k = 0; k < target.flat().size(); ++k) target.flat()[k] = select(lanes, source.flat()[k], target.flat()[k]);
+    };
+    each(to.motion, from.motion);
+    each(to.displacement, from.displacement);
+    each(to.impulse, from.impulse);
+    each(to.innovation, from.innovation);
+    each(to.delta, from.delta);
+  }
+
+  const Tree& tree_;
+  Options options_;
+  BodyConstants<EachLane<Pack>> constants_;
+  bool has_gravity_ = false, has_applied_ = false;
+  Vec3<Pack> gravity_;
+  Pack tolerance_squared_;
+  Workspace<Pack> work_;
+  Kept<Pack> kept_;  // empty with effects
+  Field<Pack> q_, p_, applied_;
+  [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;
+};
+
+}  // namespace linden
