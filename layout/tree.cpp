@@ -97,17 +97,17 @@ void share_rows(Tree& tree) {
   WaitingRows trunk(0);
   for (Index i = tree.shape.slots - 1; i > 0; --i) {
     const Index parent = tree.parent(i);
-    if (i < tree.trunk.end && tree.is_leaf(i) == 0) trunk.give_back(tree.waiting(i));
-    if (parent < tree.trunk.end && tree.is_last_child(i) != 0) tree.waiting(parent) = trunk.take();
+    if (i < tree.trunk.end && tree.is_leaf(i) == 0) trunk.give_back(tree.pending(i));
+    if (parent < tree.trunk.end && tree.is_last_child(i) != 0) tree.pending(parent) = trunk.take();
   }
   for (const Slots branch : tree.branches) {
     WaitingRows rows(trunk.end());
     for (Index i = branch.end - 1; i >= branch.begin; --i) {
       const Index parent = tree.parent(i);
-      if (tree.is_leaf(i) == 0) rows.give_back(tree.waiting(i));
-      if (parent >= branch.begin && tree.is_last_child(i) != 0) tree.waiting(parent) = rows.take();
+      if (tree.is_leaf(i) == 0) rows.give_back(tree.pending(i));
+      if (parent >= branch.begin && tree.is_last_child(i) != 0) tree.pending(parent) = rows.take();
     }
-    tree.waiting_rows = std::max(tree.waiting_rows, rows.end() - trunk.end());
+    tree.pending_rows = std::max(tree.pending_rows, rows.end() - trunk.end());
   }
 }
 
@@ -118,7 +118,7 @@ Index Tree::levels() const { return *std::ranges::max_element(level.flat()) + 1;
 Index Tree::most_threads() const {
   if (!branches_apart || branches.size() < kFewestBranches) return 1;
   const Index in_branches = shape.slots - trunk.end;
-  return std::max(1, std::min(in_branches / kBranch, in_branches / std::max(1, waiting_rows)));
+  return std::max(1, std::min(in_branches / kBranch, in_branches / std::max(1, pending_rows)));
 }
 
 std::vector<Index> Tree::roots() const {

@@ -56,11 +56,11 @@ constexpr Index velocity_count(JointKind kind) { return kind == JointKind::screw
 struct Slots {
   Index begin, end;
   Index branch = 0, back = 0;
-  Index waiting_more = 0;  // what is added to Tree::waiting from slot `branch` on: each thread has rows of its own
+  Index pending_offset = 0;  // what is added to Tree::pending from slot `branch` on: each thread has rows of its own
   /// Row of a body among these, and of one of these or of the trunk.
   Index row(Index i) const { return i - back; }
   Index row_of_parent(Index i) const { return i < branch ? i : i - back; }
-  Slots part(Index first, Index last) const { return {first, last, branch, back, waiting_more}; }
+  Slots part(Index first, Index last) const { return {first, last, branch, back, pending_offset}; }
   bool operator==(const Slots&) const = default;
 };
 
@@ -81,7 +81,7 @@ struct Run {
   FIELD(Index, first_q, 1, slots, "first row of this joint in arrays of positions")            \
   FIELD(Index, first_block, 1, slots, "first row of this joint's nv x nv block")               \
   FIELD(Index, is_leaf, 1, slots, "1 where a body has no children, else 0")                    \
-  FIELD(Index, waiting, 1, slots, "row for what children pass while a sweep goes up; free again once the body has been met") \
+  FIELD(Index, pending, 1, slots, "row for what children pass while a sweep goes up; free again once the body has been met") \
   FIELD(Index, is_last_child, 1, slots, "1 where no child of the same parent comes after: the first that an upward sweep meets")
 
 struct Tree {
@@ -92,7 +92,7 @@ struct Tree {
   Slots trunk{1, 1};
   std::vector<Slots> branches;  // empty where the whole tree has no more than kBranch bodies: it is all trunk
   bool branches_apart = false;  // no body has children in two branches, and the world none in any
-  Index waiting_rows = 0;       // rows that bodies of a branch wait in, of any but the trunk; they come after all others
+  Index pending_rows = 0;       // rows that bodies of a branch wait in, of any but the trunk; they come after all others
 
   Index bodies() const { return shape.slots - 1; }
   Index levels() const;  // the world's, 0, is one of them
@@ -101,7 +101,7 @@ struct Tree {
   /// How many threads may go over branches at once: 1 where these are few or not apart, else as many as there are rows for.
   Index most_threads() const;
   /// Row of what waits for a body.
-  Index waiting_row(Slots slots, Index i) const { return waiting(i) + (i < slots.branch ? 0 : slots.waiting_more); }
+  Index pending_row(Slots slots, Index i) const { return pending(i) + (i < slots.branch ? 0 : slots.pending_offset); }
 
   /// Lays out `parent` and `kind` (one entry a slot, slot 0 the world), as sorted_bodies leaves them.
   /// Throws std::invalid_argument where the order is not topological.

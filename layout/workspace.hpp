@@ -26,7 +26,7 @@ inline constexpr int kMatrixNumbers = std::is_same_v<Scalar, double> ? 48 : 36;
   FIELD(Scalar, twist, 6, slots, "V: velocity of the body [rad/s, m/s], body frame")                                \
   FIELD(Scalar, turn, 3, slots, "angular part of h V [rad]")                                                           \
   FIELD(Scalar, impulse, 6, slots, "h F: h mu, then summed over the subtree; moment, force")                           \
-  FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia; or what of Pi waits, see Tree::waiting") \
+  FIELD(Scalar, articulated, kMatrixNumbers<Scalar>, slots, "articulated inertia; or what of Pi waits, see Tree::pending") \
   LINDEN_FACTOR_FIELDS(FIELD)                                                                                          \
   FIELD(Scalar, bias, 6, slots, "b: impulse that reaches the parent when the joints yield")                            \
   FIELD(Scalar, variation, 6, slots, "eta: change of the body's pose at k+1, body frame [rad, m]")                     \

@@ -36,12 +36,12 @@ Index fastest_body(const Model& model, const BodyConstants<double>& constants, c
   return fastest;
 }
 
-Index largest_residual(const Model& model, const Workspace<double>& work, const Field<double>& yields) {
+Index largest_residual(const Model& model, const Workspace<double>& work, const Field<double>& joint_inverse) {
   Index worst = 1;
   double largest = -1;
   up(model.tree, [&](auto joint, Index i) {
     const Wrench<double> u = load_joint(joint, work.innovation, model.tree.first_v(i));
-    const Wrench<double> given = yield(joint, yields, model.tree.first_block(i), u);
+    const Wrench<double> given = apply_inverse(joint, joint_inverse, model.tree.first_block(i), u);
     const double share = dot(u.n, given.n) + dot(u.f, given.f);
     if (share > largest || !std::isfinite(share)) {
       largest = share;

@@ -11,7 +11,7 @@ namespace linden {
 Index worst_displacement(const Model& model, const Workspace<double>& work);
 /// Which has most kinetic energy in it.
 Index fastest_body(const Model& model, const BodyConstants<double>& constants, const Workspace<double>& work);
-/// Whose joint has the largest share of the residual's energy norm. yields: see TreeSweeps.
-Index largest_residual(const Model& model, const Workspace<double>& work, const Field<double>& yields);
+/// Whose joint has the largest share of the residual's energy norm. joint_inverse: see TreeSweeps.
+Index largest_residual(const Model& model, const Workspace<double>& work, const Field<double>& joint_inverse);
 
 }  // namespace linden

@@ -56,7 +56,7 @@ class DownAndUp {
         Slots slots = tree_.branches[last_first ? count - 1 - number : number];
         slots.branch = slots.begin;
         if (share) slots.back = slots.begin - tree_.trunk.end - thread * kBranch;
-        slots.waiting_more = thread * tree_.waiting_rows;
+        slots.pending_offset = thread * tree_.pending_rows;
         Sum own;
         in_parts_down(slots, [&](Slots part) { down(part, own); });
         in_parts_up(slots, [&](Slots part) { up(part, own); });

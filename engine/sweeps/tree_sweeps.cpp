@@ -418,7 +418,7 @@ double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before)
   up(model_.tree, [&](auto joint, Index i) {
     const Index row = model_.tree.first_v(i);
     const Wrench<double> u = load_joint(joint, work_.innovation, row);
-    const Wrench<double> given = yield(joint, work_.joint_inverse, model_.tree.first_block(i), load_joint(joint, innovation_before, row));
+    const Wrench<double> given = apply_inverse(joint, work_.joint_inverse, model_.tree.first_block(i), load_joint(joint, innovation_before, row));
     sum += dot(u.n, given.n) + dot(u.f, given.f);
   });
   return sum;

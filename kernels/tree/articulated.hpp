@@ -37,7 +37,7 @@ struct EffectsAdded {
 /// Values before this line go through memory to those after it. A 6 x 6 matrix and two placements do not fit in 32 registers, and
 /// left to themselves compilers keep all 36 numbers alive and spill them twice over: the factor of a block took 132 ns a body so,
 /// and takes 95 in steps that each fit.
-LINDEN_INLINE void settle() { asm volatile("" ::: "memory"); }
+LINDEN_INLINE void spill_here() { asm volatile("" ::: "memory"); }
 
 /// Where row k and column k of a 6 x 6 matrix stored as a Mat6 begin.
 constexpr int row_start(int k) { return 18 * (k / 3) + 3 * (k % 3); }
@@ -63,7 +63,7 @@ LINDEN_INLINE Wrench<S> load_column(const S* column) {
 /// Takes a screw out of A, 36 numbers stored as a Mat6, and stores its gains: of one body, or of several with a body in every lane.
 template <class Bodies, class S, class Element, class Added>
 LINDEN_INLINE void eliminate_screw(Bodies bodies, const Tree& tree, const BodyConstants<Element>& constants, Index i,
-                                   const typename Bodies::Scalar* A, const Gains<S>& gains, typename Bodies::Scalar* felt, const Added& added) {
+                                   const typename Bodies::Scalar* A, const Gains<S>& gains, typename Bodies::Scalar* reduced, const Added& added) {
   using B = typename Bodies::Scalar;
   const Index row = tree.first_v(i);
   const Screw<B> screw = gather<Screw>(bodies, constants.screw, i);
@@ -76,24 +76,24 @@ LINDEN_INLINE void eliminate_screw(Bodies bodies, const Tree& tree, const BodyCo
   scatter(bodies, gains.up, row, up);
   scatter(bodies, gains.down, row, inverse * W);
   scatter_row(bodies, gains.inverse, tree.first_block(i), inverse);
-  const auto take_out = [&](int at, const B& share) LINDEN_INLINE_LAMBDA { store_row(felt + at, load_row(A + at) - share * W); };
-  take_out(row_start(0), up.n.x);
-  take_out(row_start(1), up.n.y);
-  take_out(row_start(2), up.n.z);
-  take_out(row_start(3), up.f.x);
-  take_out(row_start(4), up.f.y);
-  take_out(row_start(5), up.f.z);
+  const auto downdate = [&](int at, const B& share) LINDEN_INLINE_LAMBDA { store_row(reduced + at, load_row(A + at) - share * W); };
+  downdate(row_start(0), up.n.x);
+  downdate(row_start(1), up.n.y);
+  downdate(row_start(2), up.n.z);
+  downdate(row_start(3), up.f.x);
+  downdate(row_start(4), up.f.y);
+  downdate(row_start(5), up.f.z);
 }
 
 /// Takes the joint of body i out of A, 36 numbers stored as a Mat6, and stores its gains. What is left for the parent to feel: of a free
 /// joint nothing, of a ball joint that moves freely a force alone. Effects act on screws and ball joints.
 template <JointKind Kind, class S, class Element, class Added>
 LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyConstants<Element>& constants, Index i, const S* A,
-                                   const Gains<S>& gains, S* felt, const Added& added) {
+                                   const Gains<S>& gains, S* reduced, const Added& added) {
   const Index row = tree.first_v(i), block = tree.first_block(i);
   const S zero(0.0), one(1.0);
   if constexpr (Kind == JointKind::screw) {
-    eliminate_screw(OneBody<S>{}, tree, constants, i, A, gains, felt, added);
+    eliminate_screw(OneBody<S>{}, tree, constants, i, A, gains, reduced, added);
   } else if constexpr (Kind == JointKind::ball) {
     const auto M = Mat6<S>::from(A);
     std::array<S, 9> flat;
@@ -116,7 +116,7 @@ LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyCons
       store(gains.down, row, Twist<S>{down_w.x, down_v.x});
       store(gains.down, row + 1, Twist<S>{down_w.y, down_v.y});
       store(gains.down, row + 2, Twist<S>{down_w.z, down_v.z});
-      Mat6<S>{M.aa - up_n * M.aa, M.ab - up_n * M.ab, M.ba - up_f * M.aa, M.bb - up_f * M.ab}.to(felt);
+      Mat6<S>{M.aa - up_n * M.aa, M.ab - up_n * M.ab, M.ba - up_f * M.aa, M.bb - up_f * M.ab}.to(reduced);
       return;
     }
     const Vec3<S> none{zero, zero, zero};
@@ -129,7 +129,7 @@ LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyCons
     store(gains.down, row + 1, Twist<S>{{zero, one, zero}, down.y});
     store(gains.down, row + 2, Twist<S>{{zero, zero, one}, down.z});
     const Mat3<S> nothing{none, none, none};
-    Mat6<S>{nothing, nothing, nothing, M.bb - up * M.ab}.to(felt);
+    Mat6<S>{nothing, nothing, nothing, M.bb - up * M.ab}.to(reduced);
   } else {
     std::array<S, 36> inverse;
     for (int k = 0; k < 6; ++k) load_row(A + row_start(k)).to(&inverse[static_cast<std::size_t>(6 * k)]);
@@ -139,7 +139,7 @@ LINDEN_INLINE void eliminate_joint(Joint<Kind>, const Tree& tree, const BodyCons
     for (int k = 0; k < 6; ++k) {
       for (int c = 0; c < 6; ++c) gains.up(row + k, c) = gains.down(row + k, c) = k == c ? one : zero;
     }
-    for (int k = 0; k < 36; ++k) felt[k] = zero;
+    for (int k = 0; k < 36; ++k) reduced[k] = zero;
   }
 }
 
@@ -167,7 +167,7 @@ LINDEN_INLINE void to_parent(const Placement<S>& X, const Placement<S>& X_pose, 
   row(row_start(3));
   row(row_start(4));
   row(row_start(5));
-  settle();
+  spill_here();
   column(column_start(0));
   column(column_start(1));
   column(column_start(2));

@@ -26,12 +26,12 @@ void articulated_inertia_up(const Tree& tree, const BodyConstants<Element>& cons
     A.to(articulated.row(i));
   }
   up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
-    S felt[36];
-    eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, felt, added);
+    S reduced[36];
+    eliminate_joint(joint, tree, constants, i, articulated.row(i), gains, reduced, added);
     if constexpr (joint != JointKind::free) {
       const auto X = load<Placement, S>(placement, i);
       S* const parent = articulated.row(tree.parent(i));
-      to_parent(X, X, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { parent[at] = parent[at] + value; });
+      to_parent(X, X, reduced, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { parent[at] = parent[at] + value; });
     }
   });
 }

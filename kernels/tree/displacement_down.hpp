@@ -58,7 +58,7 @@ S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field
       least = min(least, min(D.r.w, M.r.w));
     }
   };
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (std::is_same_v<S, double>) {
       const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
         const auto M = gather<Displacement>(bodies, motion, slots.row(i));
@@ -67,7 +67,7 @@ S displacement_down(const Tree& tree, const Field<S, 12>& placement, const Field
         scatter(bodies, displacement, slots.row(i), next);
         least = min(least, least_of(bodies, min(next.r.w, M.r.w)));
       };
-      for_abreast_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+      for_same_level_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {
       one_by_one(joint, part);
     }

@@ -46,10 +46,10 @@ void gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants,
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   const auto left_for = [&](Index i) LINDEN_INLINE_LAMBDA { return tree.is_leaf(i) != 0 ? zero : load<Vec3, S>(first_moment, slots.row(i)); };
   if (slots.begin == slots.end) return;
-  Vec3<S> waiting = left_for(slots.end - 1);  // what the children of the body that comes next pass to it
+  Vec3<S> pending = left_for(slots.end - 1);  // what the children of the body that comes next pass to it
   up(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const Vec3<S> own{as<S>(constants.inertia(i, 1)), as<S>(constants.inertia(i, 2)), as<S>(constants.inertia(i, 3))};
-    const Vec3<S> c = own + waiting;
+    const Vec3<S> c = own + pending;
     if constexpr (EachMoment) store(first_moment, slots.row(i), c);
     const auto g = load<Vec3, S>(field, slots.row(i));
     const S mass = as<S>(constants.subtree_mass(i));
@@ -60,12 +60,12 @@ void gravity_force_up(const Tree& tree, const BodyConstants<Element>& constants,
     const Index parent = tree.parent(i);
     const bool first = tree.is_last_child(i) != 0;
     if (parent == i - 1 && first && i > slots.begin) {
-      waiting = passed;
+      pending = passed;
       return;
     }
     const Index row = slots.row_of_parent(parent);
     store(first_moment, row, first ? passed : load<Vec3, S>(first_moment, row) + passed);
-    if (i > slots.begin) waiting = left_for(i - 1);
+    if (i > slots.begin) pending = left_for(i - 1);
   });
 }
 

@@ -17,7 +17,7 @@ namespace linden {
 
 /// d^-1 u
 template <JointKind Kind, class S>
-LINDEN_INLINE Wrench<S> yield(Joint<Kind>, const Field<S>& inverse, Index block, const Wrench<S>& u) {
+LINDEN_INLINE Wrench<S> apply_inverse(Joint<Kind>, const Field<S>& inverse, Index block, const Wrench<S>& u) {
   if constexpr (Kind == JointKind::screw) {
     return {{inverse(block) * u.n.x, S(0.0), S(0.0)}, u.f};
   } else {
@@ -35,11 +35,11 @@ LINDEN_INLINE Wrench<S> yield(Joint<Kind>, const Field<S>& inverse, Index block,
 
 /// b + gain_up u, adding |u.(d^-1 u)| to `norm`.
 template <JointKind Kind, class S>
-LINDEN_INLINE Wrench<S> passed_on(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& b,
+LINDEN_INLINE Wrench<S> bias_to_parent(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& b,
                                   const Wrench<S>& u, S& norm) {
   using std::abs;
   const Index row = tree.first_v(i);
-  const Wrench<S> given = yield(joint, gains.inverse, tree.first_block(i), u);
+  const Wrench<S> given = apply_inverse(joint, gains.inverse, tree.first_block(i), u);
   if constexpr (Kind == JointKind::screw) {
     norm = norm + abs(u.n.x * given.n.x);
     return b + u.n.x * load<Wrench, S>(gains.up, row);
@@ -64,7 +64,7 @@ S impulse_pass_up(const Tree& tree, const BodyConstants<Element>& constants, con
     const auto b = load<Wrench, S>(bias, i);
     const Wrench<S> u = load_joint(joint, residual, row) - project(joint, constants, i, b);
     store_joint(joint, innovation, row, u);
-    const Wrench<S> passed = passed_on(joint, tree, gains, i, b, u, norm);
+    const Wrench<S> passed = bias_to_parent(joint, tree, gains, i, b, u, norm);
     const Index parent = tree.parent(i);
     store(bias, parent, load<Wrench, S>(bias, parent) + to_parent(load<Placement, S>(placement, i), passed));
   });

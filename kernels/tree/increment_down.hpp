@@ -24,7 +24,7 @@ template <JointKind Kind, class S>
 LINDEN_INLINE Wrench<S> joint_increment(Joint<Kind> joint, const Tree& tree, const Gains<S>& gains, Index i, const Wrench<S>& u,
                                         const Twist<S>& xi) {
   const Index row = tree.first_v(i);
-  Wrench<S> delta = yield(joint, gains.inverse, tree.first_block(i), u);
+  Wrench<S> delta = apply_inverse(joint, gains.inverse, tree.first_block(i), u);
   const auto along = [&](Index k) {
     const auto gain = load<Twist, S>(gains.down, row + k);
     return dot(gain.w, xi.w) + dot(gain.v, xi.v);
@@ -57,7 +57,7 @@ void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const
       if (!handed_on) store(variation, slots.row(i), eta);
     }
   };
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw && std::is_same_v<S, double>) {
       const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
         const Index row = tree.first_v(i);
@@ -73,7 +73,7 @@ void yield_down(const Tree& tree, const BodyConstants<Element>& constants, const
         next.v.z = xi.v.z + screw.t * delta;
         scatter(bodies, variation, slots.row(i), next);
       };
-      for_abreast_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+      for_same_level_down(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {
       one_by_one(joint, part);
     }

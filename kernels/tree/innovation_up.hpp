@@ -34,31 +34,31 @@ void clear_world(Field<S, 6>& impulse) {
 
 /// What travels up, on its way: to a parent that comes next in registers, to others through memory.
 template <class S>
-class Climbing {
+class UpAccumulator {
  public:
-  Climbing(Field<S, 6>& impulse, Slots slots) : impulse_(impulse), slots_(slots) {
+  UpAccumulator(Field<S, 6>& impulse, Slots slots) : impulse_(impulse), slots_(slots) {
     const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-    none_ = waiting_ = {zero, zero};
+    none_ = pending_ = {zero, zero};
   }
   /// The body's own impulse and all that its children passed.
   LINDEN_INLINE Wrench<S> arrived(Index i) {
     const Index row = slots_.row(i);
-    const Wrench<S> sum = load<Wrench, S>(impulse_, row) + waiting_;
+    const Wrench<S> sum = load<Wrench, S>(impulse_, row) + pending_;
     store(impulse_, row, sum);
     return sum;
   }
   /// Bodies up to i are next, several at once: all that goes up is to be in memory.
   LINDEN_INLINE void unload(Index i) {
     const Index row = slots_.row(i);
-    store(impulse_, row, load<Wrench, S>(impulse_, row) + waiting_);
-    waiting_ = none_;
+    store(impulse_, row, load<Wrench, S>(impulse_, row) + pending_);
+    pending_ = none_;
   }
   LINDEN_INLINE void pass(const Tree& tree, Index i, const Wrench<S>& passed) {
     const Index parent = tree.parent(i);
     if (parent == i - 1 && i > slots_.begin) {
-      waiting_ = passed;
+      pending_ = passed;
     } else {
-      waiting_ = none_;
+      pending_ = none_;
       const Index row = slots_.row_of_parent(parent);
       store(impulse_, row, load<Wrench, S>(impulse_, row) + passed);
     }
@@ -67,7 +67,7 @@ class Climbing {
  private:
   Field<S, 6>& impulse_;
   Slots slots_;
-  Wrench<S> none_, waiting_;
+  Wrench<S> none_, pending_;
 };
 
 /// slots: all, or parts of a large tree in the order of Tree: whatever hangs in other parts has been met before.
@@ -75,23 +75,23 @@ template <class S, class Element>
 [[gnu::noinline]] S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Slots slots, Workspace<S>& work) {
   const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
   if (slots.end == tree.shape.slots) clear_world(work.impulse);
-  Climbing<S> climbing(work.impulse, slots);
+  UpAccumulator<S> sum_up(work.impulse, slots);
   S norm(0.0);
   const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     for (Index i = part.end - 1; i >= part.begin; --i) {
       const Index row = tree.first_v(i);
-      const Wrench<S> E = climbing.arrived(i);
+      const Wrench<S> E = sum_up.arrived(i);
       const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
       store_joint(joint, work.innovation, row, u);
-      const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
-      climbing.pass(tree, i, to_parent(load<Placement, S>(work.placement, slots.row(i)), passed));
+      const Wrench<S> passed = bias_to_parent(joint, tree, gains, i, E, -u, norm);
+      sum_up.pass(tree, i, to_parent(load<Placement, S>(work.placement, slots.row(i)), passed));
     }
   };
-  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw && std::is_same_v<S, double>) {
       const auto many = [&](auto bodies, Index i) LINDEN_INLINE_LAMBDA {
         using std::abs;
-        climbing.unload(i + kBodies - 1);
+        sum_up.unload(i + kBodies - 1);
         const Index row = tree.first_v(i);
         const auto E = gather<Wrench>(bodies, work.impulse, slots.row(i));
         const auto screw = gather<Screw>(bodies, constants.screw, i);
@@ -101,7 +101,7 @@ template <class S, class Element>
         const auto passed = E - u * gather<Wrench>(bodies, gains.up, row);
         add_at(bodies, work.impulse, rows_of_parents(tree, slots, i).data(), to_parent(gather<Placement>(bodies, work.placement, slots.row(i)), passed));
       };
-      for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+      for_same_level_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {
       one_by_one(joint, part);
     }
@@ -132,10 +132,10 @@ template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
     if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.pull.row(i));
     if (tree.is_leaf(i) == 0) A = A + Mat6<S>::from(work.articulated.row(i));
     A.to(work.articulated.row(i));
-    settle();
+    spill_here();
     S felt[36];
     eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt, added);
-    settle();
+    spill_here();
 
     const auto X = load<Placement, S>(work.placement, i);
     S* const above = work.articulated.row(parent);
@@ -149,12 +149,12 @@ template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
     } else if (tree.is_last_child(i) != 0) {
       for (int k = 0; k < 36; ++k) above[k] = S(0.0);
     }
-    settle();
+    spill_here();
 
     const auto E = load<Wrench, S>(work.impulse, i);
     const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
     store_joint(joint, work.innovation, row, u);
-    const Wrench<S> passed = passed_on(joint, tree, gains, i, E, -u, norm);
+    const Wrench<S> passed = bias_to_parent(joint, tree, gains, i, E, -u, norm);
     // through memory: six registers more to hold would cost more than they spare
     store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(X, passed));
   });

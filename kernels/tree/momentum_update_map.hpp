@@ -42,7 +42,7 @@ void momentum_target_map(const Tree& tree, const S& h, const Field<S>& momentum,
 template <class S, class Element>
 void momentum_at_end_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 7>& displacement,
                        const Field<S, 6>& impulse, const Field<S>& residual, Slots slots, Field<S>& seen) {
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
@@ -70,7 +70,7 @@ template <class S, class Element>
 void momentum_update_map(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Field<S, 7>& displacement,
                          const Field<S, 6>& impulse, const Field<S>& residual, const Field<S>& force, Slots slots, Field<S>& momentum) {
   const S half = S(0.5) * h;
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {

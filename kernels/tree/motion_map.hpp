@@ -41,7 +41,7 @@ LINDEN_INLINE Displacement<S> joint_motion(Joint<Kind> joint, const BodyConstant
 
 template <class S, class Element>
 void motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& delta, Slots slots, Field<S, 7>& motion) {
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {
@@ -58,7 +58,7 @@ void motion_map(const Tree& tree, const BodyConstants<Element>& constants, const
 template <class S, class Element>
 void correct_motion_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& increment, const S& factor,
                         Slots slots, Field<S>& delta, Field<S, 7>& motion) {
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_v(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {

@@ -14,7 +14,7 @@
 // binary tree of 1,023 takes 30 ns a body instead of 40.
 //
 // reads   inertia 10 x n, screw 2 x n, placement 12 x n at q^k, motion 7 x n, displacement 7 x n
-// writes  gains; articulated is scratch: what waits for a body, in its row tree.waiting
+// writes  gains; articulated is scratch: what waits for a body, in its row tree.pending
 // slots   all, or parts of a large tree as for innovation_up
 // source  derivative of Algorithm 2 of the paper with respect to q^k+1, arranged as Featherstone's ABI
 #pragma once
@@ -63,7 +63,7 @@ LINDEN_INLINE Rows6 pass_screw(const Tree& tree, const BodyConstants<double>& co
                  t * __builtin_shufflevector(along, along, 5, 5, 5, 5, 5, 5, 5, 5);
   if constexpr (Added::to_joints) d += spread(added.stiffness(tree.first_v(i)));
   const Row8 inverse = 1.0 / d;
-  settle();
+  spill_here();
   Row8 across[6];
   for (int k = 0; k < 6; ++k) across[k] = r * spread(numbers[8 * k + 2]) + t * spread(numbers[8 * k + 5]);
   const Row8 gain = inverse * along;
@@ -92,7 +92,7 @@ LINDEN_INLINE Rows6 pass_joint(Joint<Kind> joint, const Tree& tree, const BodyCo
 
 /// Screws i ... i + W - 1 of one level, each in a lane: their gains, and to their parents what they pass.
 template <bool ByColumns, class Added>
-void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
+void factor_same_level(const Tree& tree, const BodyConstants<double>& constants, const Field<double, 12>& placement,
                     const Field<double, 7>& motion, const Field<double, 7>& displacement, Slots slots, Index i,
                     Field<double, kRowNumbers>& articulated, const Gains<double>& gains, const Added& added) {
   constexpr ManyBodies bodies;
@@ -104,7 +104,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
   const auto u = log(gather<Displacement>(bodies, displacement, slots.row(i)));
   const auto G = gather<Inertia>(bodies, constants.inertia, i);
   pose_derivative(G, u, G * u).to(A);
-  settle();
+  spill_here();
   if constexpr (Added::to_bodies) {
     BodyPack pull[36];
     turning::rows_to_lanes<36>([&](int l) LINDEN_INLINE_LAMBDA { return added.pull.row(i + l); }, pull);
@@ -114,20 +114,20 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
     const auto has_children = at_bodies(bodies, tree.is_leaf, i) < BodyPack(0.5);
     for (int line = 0; line < 6; ++line) {
       BodyPack left[6];
-      turning::rows_to_lanes<6>([&](int l) LINDEN_INLINE_LAMBDA { return articulated.row(tree.waiting_row(slots, i + l)) + 8 * line; }, left);
+      turning::rows_to_lanes<6>([&](int l) LINDEN_INLINE_LAMBDA { return articulated.row(tree.pending_row(slots, i + l)) + 8 * line; }, left);
       for (int k = 0; k < 6; ++k) {
         BodyPack& number = A[place(ByColumns, line, k)];
         number = select(has_children, number + left[k], number);
       }
     }
   }
-  settle();
+  spill_here();
   eliminate_screw(bodies, tree, constants, i, A, gains, felt, added);
-  settle();
+  spill_here();
   const auto X = gather<Placement>(bodies, placement, slots.row(i));
   const auto X_pose = after_motion(Joint<JointKind::screw>{}, X, gather<Displacement>(bodies, motion, slots.row(i)));
   to_parent(X, X_pose, felt, [&](int at, const BodyPack& value) LINDEN_INLINE_LAMBDA { A[at] = value; });
-  settle();
+  spill_here();
   alignas(kAlignment) double passed[kBodies * kRowNumbers];
   for (int line = 0; line < 6; ++line) {
     BodyPack numbers[6];
@@ -136,7 +136,7 @@ void factor_abreast(const Tree& tree, const BodyConstants<double>& constants, co
   }
   for (Index l = kBodies - 1; l >= 0; --l) {
     const double* const from = passed + l * kRowNumbers;
-    double* const kept = articulated.row(tree.waiting_row(slots, tree.parent(i + l)));
+    double* const kept = articulated.row(tree.pending_row(slots, tree.parent(i + l)));
     const bool first = tree.is_last_child(i + l) != 0;
     for (int k = 0; k < 48; k += 8) store_row8(kept + k, first ? load_row8(from + k) : load_row8(from + k) + load_row8(kept + k));
   }
@@ -152,20 +152,20 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
   const auto left_for = [&](Index i) LINDEN_INLINE_LAMBDA {
     Rows6 rows{};
     if (tree.is_leaf(i) != 0) return rows;
-    for (int k = 0; k < 6; ++k) rows.r[k] = load_row8(articulated.row(tree.waiting_row(slots, i)) + 8 * k);
+    for (int k = 0; k < 6; ++k) rows.r[k] = load_row8(articulated.row(tree.pending_row(slots, i)) + 8 * k);
     return rows;
   };
   const auto one_by_one = [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
-    Rows6 waiting = left_for(part.end - 1);  // what the children of the body that comes next pass to it
+    Rows6 pending = left_for(part.end - 1);  // what the children of the body that comes next pass to it
     for (Index i = part.end - 1; i >= part.begin; --i) {
       if (i < tile) {
-        // full registers of bodies; no more where those that follow are factored abreast
+        // full registers of bodies; no more where those that follow lie on one level
         const Index most = is_wide(tree, i) ? (i - part.begin) / kBodies * kBodies + kBodies : kTile;
         tile = std::max(slots.begin, i + 1 - std::min(kTile, most));
         pose_derivative_rows(tree, constants, displacement, slots.part(tile, i + 1), K);
       }
       Rows6 A;
-      for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + waiting.r[k];
+      for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + pending.r[k];
       const bool by_columns = tree.level(i) % 2 != 0;
       if constexpr (Added::to_bodies) {
         const Rows6 pull = rows_of(added.pull.row(i));
@@ -187,21 +187,21 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
       const Index parent = tree.parent(i);
       const bool first = tree.is_last_child(i) != 0;
       if (parent == i - 1 && first && i > part.begin) {
-        waiting = passed;
+        pending = passed;
         continue;
       }
-      double* const kept = articulated.row(tree.waiting_row(slots, parent));
+      double* const kept = articulated.row(tree.pending_row(slots, parent));
       for (int k = 0; k < 6; ++k) store_row8(kept + 8 * k, first ? passed.r[k] : passed.r[k] + load_row8(kept + 8 * k));
-      if (i > part.begin) waiting = left_for(i - 1);
+      if (i > part.begin) pending = left_for(i - 1);
     }
   };
-  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const auto many = [&](auto, Index i) LINDEN_INLINE_LAMBDA {
-        const auto factor = tree.level(i) % 2 != 0 ? factor_abreast<true, Added> : factor_abreast<false, Added>;
+        const auto factor = tree.level(i) % 2 != 0 ? factor_same_level<true, Added> : factor_same_level<false, Added>;
         factor(tree, constants, placement, motion, displacement, slots, i, articulated, gains, added);
       };
-      for_abreast_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
+      for_same_level_up(tree, part, many, [&](Slots few) LINDEN_INLINE_LAMBDA { one_by_one(joint, few); });
     } else {
       one_by_one(joint, part);
     }

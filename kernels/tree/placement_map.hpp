@@ -42,7 +42,7 @@ LINDEN_INLINE Placement<S> placed(Joint<Kind>, const BodyConstants<Element>& con
 template <class S, class Element>
 void placement_map(const Tree& tree, const BodyConstants<Element>& constants, const Field<S>& q, Slots slots,
                    Field<S, 12>& placement) {
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     if constexpr (joint == JointKind::screw) {
       const Index shift = tree.first_q(part.begin) - part.begin;
       for_bodies<S>(part.begin, part.end, [&](auto bodies, Index i) {

@@ -6,7 +6,7 @@
 //     scatter(bodies, twist, i, log(D));
 //   });
 //
-// `bodies` is ManyBodies, i ... i + W - 1 in the lanes of a BodyPack, and at the end OneBody. A scan goes by for_abreast_down or _up:
+// `bodies` is ManyBodies, i ... i + W - 1 in the lanes of a BodyPack, and at the end OneBody. A scan goes by for_same_level_down or _up:
 // ManyBodies are of one level there, so none is the parent of another; gather_at reads the rows of their parents.
 //
 // Rows of a field lie one behind the other, so W of them are turned (rows into lanes) as they are read and written: some 3 shuffles a
@@ -122,7 +122,7 @@ LINDEN_INLINE void for_bodies(Index begin, Index end, const Action& action) {
 }
 
 /// Whether bodies i ... i + W - 1 are all of one level.
-LINDEN_INLINE bool abreast(const Tree& tree, Index i) {
+LINDEN_INLINE bool same_level(const Tree& tree, Index i) {
   const Index* const level = tree.level.row(i);
   if (level[0] != level[kBodies - 1]) return false;
   bool same = true;
@@ -133,11 +133,11 @@ LINDEN_INLINE bool abreast(const Tree& tree, Index i) {
 /// Whether such bodies are to be found near slot i: not so along a chain or in a humanoid.
 LINDEN_INLINE bool is_wide(const Tree& tree, Index i) { return tree.runs[static_cast<std::size_t>(tree.run(i))].widest >= kBodies; }
 
-/// Of slots that hold one kind of joint: many(ManyBodies, i) where a register of them is abreast, few(part) for what lies between, root to
+/// Of slots that hold one kind of joint: many(ManyBodies, i) where a register of them lies on one level, few(part) for what lies between, root to
 /// leaves.
 template <class Many, class Few>
-LINDEN_INLINE void for_abreast_down(const Tree& tree, Slots slots, const Many& many, const Few& few) {
-  const auto wide = [&](Index i) LINDEN_INLINE_LAMBDA { return i + kBodies <= slots.end && abreast(tree, i); };
+LINDEN_INLINE void for_same_level_down(const Tree& tree, Slots slots, const Many& many, const Few& few) {
+  const auto wide = [&](Index i) LINDEN_INLINE_LAMBDA { return i + kBodies <= slots.end && same_level(tree, i); };
   if (!is_wide(tree, slots.begin)) return few(slots);
   for (Index i = slots.begin; i < slots.end;) {
     if (wide(i)) {
@@ -153,8 +153,8 @@ LINDEN_INLINE void for_abreast_down(const Tree& tree, Slots slots, const Many& m
 
 /// The same, leaves to root.
 template <class Many, class Few>
-LINDEN_INLINE void for_abreast_up(const Tree& tree, Slots slots, const Many& many, const Few& few) {
-  const auto wide = [&](Index end) LINDEN_INLINE_LAMBDA { return end - kBodies >= slots.begin && abreast(tree, end - kBodies); };
+LINDEN_INLINE void for_same_level_up(const Tree& tree, Slots slots, const Many& many, const Few& few) {
+  const auto wide = [&](Index end) LINDEN_INLINE_LAMBDA { return end - kBodies >= slots.begin && same_level(tree, end - kBodies); };
   if (!is_wide(tree, slots.begin)) return few(slots);
   for (Index i = slots.end; i > slots.begin;) {
     if (wide(i)) {

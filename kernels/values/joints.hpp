@@ -39,24 +39,24 @@ inline Slots velocities(const Tree& tree, Slots slots) {
   return {tree.first_v(slots.begin), slots.end < tree.shape.slots ? tree.first_v(slots.end) : tree.shape.velocities};
 }
 
-/// stretch(joint, slots) for every stretch of one kind, root to leaves.
-template <class Stretch>
-LINDEN_INLINE void stretches(const Tree& tree, Slots slots, Stretch&& stretch) {
+/// part_of_run(joint, slots) for every part of the slots that is of one kind, root to leaves.
+template <class RunPart>
+LINDEN_INLINE void run_parts_down(const Tree& tree, Slots slots, RunPart&& part_of_run) {
   for (Index begin = slots.begin; begin < slots.end;) {
     const Run& run = tree.runs[static_cast<std::size_t>(tree.run(begin))];
     const Slots part = slots.part(begin, std::min(run.end, slots.end));
-    with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
+    with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { part_of_run(joint, part); });
     begin = part.end;
   }
 }
 
 /// The same, leaves to root.
-template <class Stretch>
-LINDEN_INLINE void stretches_up(const Tree& tree, Slots slots, Stretch&& stretch) {
+template <class RunPart>
+LINDEN_INLINE void run_parts_up(const Tree& tree, Slots slots, RunPart&& part_of_run) {
   for (Index end = slots.end; end > slots.begin;) {
     const Run& run = tree.runs[static_cast<std::size_t>(tree.run(end - 1))];
     const Slots part = slots.part(std::max(run.begin, slots.begin), end);
-    with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { stretch(joint, part); });
+    with_joint(run.kind, [&](auto joint) LINDEN_INLINE_LAMBDA { part_of_run(joint, part); });
     end = part.begin;
   }
 }
@@ -64,7 +64,7 @@ LINDEN_INLINE void stretches_up(const Tree& tree, Slots slots, Stretch&& stretch
 /// body(joint, i) for slots begin ... end - 1, root to leaves.
 template <class Body>
 LINDEN_INLINE void down(const Tree& tree, Slots slots, Body&& body) {
-  stretches(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_down(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     for (Index i = part.begin; i < part.end; ++i) body(joint, i);
   });
 }
@@ -78,7 +78,7 @@ LINDEN_INLINE void down(const Tree& tree, Body&& body) {
 /// body(joint, i) for slots end - 1 ... begin, leaves to root.
 template <class Body>
 LINDEN_INLINE void up(const Tree& tree, Slots slots, Body&& body) {
-  stretches_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
+  run_parts_up(tree, slots, [&](auto joint, Slots part) LINDEN_INLINE_LAMBDA {
     for (Index i = part.end - 1; i >= part.begin; --i) body(joint, i);
   });
 }

@@ -95,10 +95,10 @@ TEST_CASE("a scan meets every body once, in order, and several at once only wher
           for (Index i = part.begin; i < part.end; ++i) met.push_back(i);
         };
       };
-      for_abreast_down(tree, slots, many(downward), few(downward));
+      for_same_level_down(tree, slots, many(downward), few(downward));
       CHECK(std::ranges::is_sorted(downward));
       std::vector<Index> blocks;  // where each of the upward blocks begins
-      for_abreast_up(tree, slots, [&](auto bodies, Index i) { blocks.push_back(i), many(upward)(bodies, i); },
+      for_same_level_up(tree, slots, [&](auto bodies, Index i) { blocks.push_back(i), many(upward)(bodies, i); },
                      [&](Slots part) { blocks.push_back(part.begin), few(upward)(part); });
       CHECK(std::ranges::is_sorted(blocks, std::greater<>{}));
       std::ranges::sort(upward);

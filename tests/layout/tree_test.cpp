@@ -86,12 +86,12 @@ TEST_CASE("no two bodies whose children have passed something share a row while 
     std::set<Index> taken;
     std::size_t most = 0;
     for (Index i = tree.shape.slots - 1; i > 0; --i) {
-      if (tree.is_leaf(i) == 0) CHECK(taken.erase(tree.waiting(i)) == 1);
-      if (tree.is_last_child(i) != 0 && !taken.insert(tree.waiting(tree.parent(i))).second) FAIL("slot " << i);
+      if (tree.is_leaf(i) == 0) CHECK(taken.erase(tree.pending(i)) == 1);
+      if (tree.is_last_child(i) != 0 && !taken.insert(tree.pending(tree.parent(i))).second) FAIL("slot " << i);
       most = std::max(most, taken.size());
     }
-    CHECK(taken == std::set{tree.waiting(0)});
-    CHECK(most < static_cast<std::size_t>(tree.bodies() / 4));  // random trees, the widest, have a fifth of their bodies waiting at once
+    CHECK(taken == std::set{tree.pending(0)});
+    CHECK(most < static_cast<std::size_t>(tree.bodies() / 4));  // random trees, the widest, have a fifth of their bodies pending at once
   }
 }
 
@@ -130,17 +130,17 @@ TEST_CASE("bodies of branches wait in rows that none of the trunk has") {
     INFO(model.names.model);
     Index end = 0;  // of the rows of the trunk
     for (Index i = 0; i < tree.trunk.end; ++i) {
-      if (tree.is_leaf(i) == 0) end = std::max(end, tree.waiting(i) + 1);
+      if (tree.is_leaf(i) == 0) end = std::max(end, tree.pending(i) + 1);
     }
     Slots third{0, 0};
     third.branch = tree.trunk.end;
-    third.waiting_more = 2 * tree.waiting_rows;
+    third.pending_offset = 2 * tree.pending_rows;
     for (Index i = tree.trunk.end; i < tree.shape.slots; ++i) {
       if (tree.is_leaf(i) != 0) continue;
-      if (tree.waiting(i) < end || tree.waiting(i) >= end + tree.waiting_rows) FAIL("slot " << i);
-      if (tree.waiting_row(third, i) != tree.waiting(i) + third.waiting_more) FAIL("slot " << i);
+      if (tree.pending(i) < end || tree.pending(i) >= end + tree.pending_rows) FAIL("slot " << i);
+      if (tree.pending_row(third, i) != tree.pending(i) + third.pending_offset) FAIL("slot " << i);
     }
-    CHECK(tree.waiting_row(third, 0) == tree.waiting(0));
+    CHECK(tree.pending_row(third, 0) == tree.pending(0));
   }
 }
 
