@@ -291,12 +291,17 @@ std::vector<Row> times(const Place& place, double budget) {
     const Contender& contender = rows.front().timed[k].contender;
     if (!contender.drawn) continue;
     Series series{contender.name, {}, {}, Mark::both};
+    std::vector<Index> failed;
     for (const Row& row : rows) {
       const Timed& t = row.timed[k];
-      if (t.failed || t.frames == 0) continue;
+      if (t.failed || t.frames == 0) {
+        failed.push_back(row.links);
+        continue;
+      }
       series.x.push_back(row.links);
       series.y.push_back(1e6 * t.per_frame());
     }
+    if (!failed.empty()) series.label += fmt::format(", fails at {}", fmt::join(failed, ", "));
     chart.series.push_back(std::move(series));
   }
   place.figure("times", {&chart, 1});
@@ -357,7 +362,7 @@ Chart convergence_of(const std::string& title, const std::string& subtitle, Inde
                          series.y[k]);
     }
     const bool newton = root_finding == RootFinding::newton_dense && evaluation == Evaluation::drnea;
-    if (newton) series.label = "Newton, dense or O(n), + DRNEA";  // the iterates of both are the same
+    if (newton) series.label.replace(0, std::string_view("Newton").size(), "Newton, dense or O(n),");  // the iterates of both are the same
     if (drawn) chart.series.push_back(std::move(series));
   };
   for (const RootFinding root_finding : {RootFinding::riqn, RootFinding::broyden, RootFinding::newton_dense}) {
@@ -394,9 +399,13 @@ void iterations(const Place& place) {
               {}};
   const auto run = [&](Contender contender) {
     Series series{contender.name, {}, {}, Mark::line};
+    int failed = 0;
     for (int frame = 1; frame <= kShown; ++frame) {
       const Frame found = contender.step();
-      if (!found.ok) break;
+      if (!found.ok) {
+        failed = frame;
+        break;
+      }
       series.x.push_back(frame);
       series.y.push_back(found.corrections);
     }
@@ -408,6 +417,7 @@ void iterations(const Place& place) {
     csv += fmt::format("\"{}\",{},{:.3f},{:.3f},{},{}\n", series.label, series.y.size(), mean, deviation,
                        *std::ranges::min_element(series.y), *std::ranges::max_element(series.y));
     series.label += fmt::format(" {:.2f} \u00b1 {:.2f}", mean, deviation);
+    if (failed > 0) series.label += fmt::format(", fails in frame {}", failed);
     if (contender.drawn) chart.series.push_back(std::move(series));
   };
   const double tolerance = paper_tolerance(kLinks);

@@ -238,6 +238,10 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
                                counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
                                order_text(options), options.step, counted(figures.run.steps, "step"), gravity_text(options), begin_text(arguments, figures),
                                energy.initial());
+  if (scaled && std::isfinite(energy.slope_error())) {
+    chart.subtitle += fmt::format("; slope {:+.1e} \u00b1 {:.1e} per second", energy.slope() / energy.scale(), energy.slope_error() / energy.scale());
+  }
+  if (!figures.failure.empty()) chart.subtitle += "; FAILED: " + printable(figures.failure);
   chart.x.label = "time [s]";
   const bool effects = !effect_lines(arguments.effects(), simulation.model()).empty();
   const char* drift = effects ? "H \u2212 H(0) \u2212 work of effects" : "H \u2212 H(0)";
