@@ -409,6 +409,12 @@ void iterations(const Place& place) {
       series.x.push_back(frame);
       series.y.push_back(found.corrections);
     }
+    if (series.y.empty()) {
+      csv += fmt::format("\"{}\",0,,,,\n", series.label);
+      series.label += ", fails in frame 1";
+      if (contender.drawn) chart.series.push_back(std::move(series));
+      return;
+    }
     const double count = static_cast<double>(series.y.size());
     const double mean = std::accumulate(series.y.begin(), series.y.end(), 0.0) / count;
     double squares = 0;
