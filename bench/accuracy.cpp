@@ -235,15 +235,11 @@ plot::Chart long_chart(const std::vector<AccuracyRow>& rows, double duration, do
   chart.title = fmt::format("over {:g} s", duration);
   chart.x = {"CPU time per simulated second [ms]", true};
   chart.y = {label, true};
-  for (const AccuracyRow& row : rows) {
-    if (chart.series.empty() || chart.series.back().label != name(row.method)) {
-      chart.series.push_back({name(row.method), {}, {}, plot::Mark::both});
-    }
-    if (!row.done() || !(row.*value > 0)) continue;
-    chart.series.back().x.push_back(1e3 * row.seconds / duration);
-    chart.series.back().y.push_back(row.*value);
+  for (auto first = rows.begin(); first != rows.end();) {
+    const auto last = std::find_if(first, rows.end(), [&](const AccuracyRow& row) { return row.method != first->method; });
+    chart.series.push_back(accuracy_curve({first, last}, value, 1e3 / duration));
+    first = last;
   }
-  std::erase_if(chart.series, [](const plot::Series& series) { return series.x.empty(); });
   return chart;
 }
 
@@ -276,7 +272,7 @@ void long_runs(const Files& files) {
     }
     energies[0].title =
         fmt::format("Energy of {} over 1 s, 10 s and 1,000 s", floats ? "the tumbling humanoid" : "the ten-link chain");
-    energies[0].subtitle = "step sizes fall from left to right along each curve; over 1 s";
+    energies[0].subtitle = "beside the points: step h [ms]; over 1 s";
     files.figure(study.file + "-long", energies);
     if (!floats) continue;
     momenta[0].title = "Momentum of the tumbling humanoid over 1 s, 10 s and 1,000 s";
@@ -366,6 +362,7 @@ void tolerances(const Files& files) {
     chart.y = {"energy band, share of the largest kinetic energy", true};
     for (const int order : {2, 4, 6}) {
       plot::Series series{.label = fmt::format("order {}", order), .x = {}, .y = {}, .mark = plot::Mark::both};
+      std::vector<std::string> failed;
       for (int digits = 1; digits <= 13; ++digits) {
         const double tolerance = std::pow(10.0, -digits);
         const AccuracyRow row = measure_energy(setup_of(study, duration, 1e4), {Kind::composed, order}, 1e-3, tolerance, scale);
@@ -373,11 +370,15 @@ void tolerances(const Files& files) {
                            row.band, row.slope, row.slope_error, row.momentum,
                            static_cast<double>(row.evaluations) / static_cast<double>(std::max<std::int64_t>(1, row.steps)),
                            row.seconds, row.failure.empty() ? "" : "failed");
-        if (!row.done()) continue;
+        if (!row.done()) {
+          failed.push_back(fmt::format("{:.0e}", tolerance));
+          continue;
+        }
         series.x.push_back(tolerance);
         series.y.push_back(row.band);
       }
-      if (!series.x.empty()) chart.series.push_back(std::move(series));
+      if (!failed.empty()) series.label += fmt::format(", failed at {}", fmt::join(failed, ", "));
+      chart.series.push_back(std::move(series));
     }
     charts.push_back(std::move(chart));
   }

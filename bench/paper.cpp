@@ -5,7 +5,7 @@
 //
 //   figure 2b  energy of a ten-link chain over time: RIQN, semi-implicit Euler, linden's default
 //   figure 3   time of a frame over degrees of freedom, every evaluation with every root finder: 10,000 frames, or as many as
-//              BUDGET seconds [120] of one core allow
+//              BUDGET seconds [120] of one core allow (bench/paper_times.cpp)
 //   figure 4a  residual over corrections in one step, from q^k and from the zero configuration
 //   figure 4b  corrections a frame takes, mean and deviation
 //   ratios     the paper's headline figures beside those of figure 3
@@ -15,27 +15,23 @@
 // turns of a hundredth of a second, so that whatever else the machine does hits them alike. Nothing is extrapolated, and who fails
 // a step stops there.
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iostream>
 #include <memory>
 #include <numbers>
 #include <numeric>
 #include <stdexcept>
 
-#include "bench/comparators/integrator.hpp"
-#include "bench/machine.hpp"
+#include "bench/paper_contenders.hpp"
+#include "bench/paper_times.hpp"
 #include "engine/baseline/baseline.hpp"
-#include "engine/files/output_file.hpp"
 #include "engine/program/plot.hpp"
 #include "engine/simulation.hpp"
 #include "models/build/generators.hpp"
-#include "models/build/random.hpp"
 
-namespace linden {
+namespace linden::paper {
 namespace {
 
 using comparators::Evaluation;
@@ -47,81 +43,6 @@ using comparators::Solved;
 using plot::Chart;
 using plot::Mark;
 using plot::Series;
-
-constexpr int kFrames = 10'000;
-constexpr double kStep = 1e-3;  // [s]
-
-struct Place {
-  std::string results, figures, label;
-  void table(const std::string& name, const std::string& csv) const {
-    write_file(fmt::format("{}/paper-{}-{}.csv", results, name, label), csv);
-  }
-  void figure(const std::string& name, std::span<const Chart> panels) const {
-    plot::draw(fmt::format("{}/paper-{}.png", figures, name), panels);
-  }
-};
-
-std::string machine() { return fmt::format("{}, one core, g++ {}.{}", processor(), __GNUC__, __GNUC_MINOR__); }
-
-/// Processor time of this thread [s].
-double now() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-struct Start {
-  std::vector<double> q, v;
-};
-
-Start random_start(const Model& model, double positions, double velocities) {
-  Random random(2016);
-  Start start;
-  for (Index i = 0; i < model.tree.shape.velocities; ++i) {
-    start.q.push_back(random.uniform(-positions, positions));
-    start.v.push_back(random.uniform(-velocities, velocities));
-  }
-  return start;
-}
-
-struct Frame {
-  bool ok;
-  int corrections, evaluations;
-};
-
-/// An evaluation with a root finder, or the engine as it comes.
-struct Contender {
-  std::string name, evaluation, root_finding;
-  bool drawn;  // in the figure; the others stand in the table only
-  std::function<Frame()> step;
-};
-
-Contender contender(const Model& model, const Start& start, RootFinding root_finding, Evaluation evaluation, double tolerance,
-                    bool drawn = true) {
-  Settings settings{.evaluation = evaluation, .root_finding = root_finding, .step = kStep};
-  settings.stop.tolerance = tolerance;
-  const auto integrator = std::make_shared<Integrator>(model, settings);
-  integrator->set(start.q, start.v);
-  const std::string both = comparators::name(root_finding, evaluation);
-  const std::size_t plus = both.find(" + ");
-  return {both, both.substr(plus + 3), both.substr(0, plus), drawn, [integrator] {
-            const Solved solved = integrator->step();
-            return Frame{solved.converged, solved.iterations, solved.evaluations};
-          }};
-}
-
-/// linden with its own first guess and its own test.
-Contender engine(const Model& model, const Start& start) {
-  const auto simulation = std::make_shared<Simulation>(model, Options{.step = kStep, .gravity = {0, 0, 0}});
-  simulation->set_positions(start.q);
-  simulation->set_velocities(start.v);
-  return {"linden's default", "DRNEA", "linden's default", true, [simulation] {
-            const StepReport report = simulation->step();
-            return Frame{report.ok() && report.substeps == 1, report.iterations, report.evaluations};
-          }};
-}
-
-double paper_tolerance(Index links) { return 1e-9 * links; }
 
 void energy(const Place& place) {
   constexpr Index kLinks = 10;
@@ -184,160 +105,6 @@ void energy(const Place& place) {
   place.figure("energy", panels);
 }
 
-struct Timed {
-  Contender contender;
-  double seconds = 0;
-  std::int64_t corrections = 0, evaluations = 0;
-  int frames = 0;
-  bool failed = false;
-  std::vector<std::pair<int, double>> so_far{};  // frames, seconds at every look at the clock
-
-  bool done(double budget) const { return failed || frames == kFrames || seconds >= budget; }
-  double per_frame() const { return seconds / frames; }
-  /// Over as many of the first frames.
-  double per_frame(int first) const {
-    const auto past = std::ranges::upper_bound(so_far, first, {}, &std::pair<int, double>::first);
-    const auto [count, time] = past == so_far.begin() ? so_far.front() : *(past - 1);
-    return time / count;
-  }
-
-  void run_until(double until) {
-    // a look at the clock costs a quarter of a microsecond
-    const int between_clocks = frames > 0 && per_frame() < 2e-5 ? 50 : 5;
-    while (seconds < until && frames < kFrames && !failed) {
-      const double begin = now();
-      for (int k = 0; k < between_clocks && frames < kFrames; ++k) {
-        const Frame frame = contender.step();
-        if (!frame.ok) {
-          failed = true;
-          break;
-        }
-        frames += 1;
-        corrections += frame.corrections;
-        evaluations += frame.evaluations;
-      }
-      seconds += now() - begin;
-      if (frames > 0) so_far.emplace_back(frames, seconds);
-    }
-  }
-};
-
-struct Row {
-  Index links;
-  std::vector<Timed> timed;
-
-  const Timed* find(const std::string& name) const {
-    const auto it = std::ranges::find_if(timed, [&](const Timed& t) { return t.contender.name == name; });
-    return it == timed.end() || it->frames == 0 || it->failed ? nullptr : &*it;
-  }
-};
-
-Row time_all(Index links, double budget) {
-  const Model model = paper_chain(links);
-  const Start start = random_start(model, std::numbers::pi / 2, std::numbers::pi / 2);
-  const double tolerance = paper_tolerance(links);
-  Row row{links, {}};
-  const auto add = [&](RootFinding root_finding, Evaluation evaluation, bool drawn) {
-    row.timed.push_back({contender(model, start, root_finding, evaluation, tolerance, drawn)});
-  };
-  for (const Evaluation evaluation : {Evaluation::svi, Evaluation::drnea}) {
-    for (const RootFinding root_finding : {RootFinding::newton_dense, RootFinding::broyden, RootFinding::riqn}) {
-      add(root_finding, evaluation, true);
-    }
-  }
-  add(RootFinding::newton_linear, Evaluation::drnea, true);
-  row.timed.push_back({engine(model, start)});
-  add(RootFinding::broyden_kept, Evaluation::drnea, false);
-  add(RootFinding::broyden_kept, Evaluation::svi, false);
-  for (const RootFinding root_finding : {RootFinding::newton_dense, RootFinding::riqn}) {
-    add(root_finding, Evaluation::svi_log, false);
-  }
-  constexpr double kTurn = 0.01;  // [s]
-  const auto done = [&](const Timed& timed) { return timed.done(budget); };
-  for (double until = kTurn; !std::ranges::all_of(row.timed, done); until += kTurn) {
-    for (Timed& timed : row.timed) {
-      if (!timed.done(budget)) timed.run_until(until);
-    }
-  }
-  return row;
-}
-
-std::vector<Row> times(const Place& place, double budget) {
-  std::vector<Row> rows;
-  std::string csv = "dofs,evaluation,root_finding,frames,seconds,microseconds_per_frame,corrections_per_frame,"
-                    "evaluations_per_frame,failed_in_frame\n";
-  bool all_frames = true;
-  for (const Index links : {2, 5, 10, 20, 40, 70, 100}) {
-    rows.push_back(time_all(links, budget));
-    for (const Timed& t : rows.back().timed) {
-      const double frames = t.frames;
-      csv += fmt::format("{},{},\"{}\",{},{:.4f},{:.3f},{:.3f},{:.2f},{}\n", links, t.contender.evaluation,
-                         t.contender.root_finding, t.frames, t.seconds, 1e6 * t.per_frame(),
-                         static_cast<double>(t.corrections) / frames, static_cast<double>(t.evaluations) / frames,
-                         t.failed ? std::to_string(t.frames + 1) : "");
-      if (t.contender.drawn) all_frames = all_frames && t.frames == kFrames;
-    }
-    std::cerr << fmt::format("{} degrees of freedom timed\n", links);
-  }
-  place.table("times", csv);
-  std::cout << csv;
-
-  Chart chart{"Time of a frame over degrees of freedom",
-              (all_frames ? "10,000 frames each; " : fmt::format("10,000 frames or {:g} s each; ", budget)) + machine(),
-              {"degrees of freedom", true},
-              {"time per frame [\u00b5s]", true},
-              {}};
-  for (std::size_t k = 0; k < rows.front().timed.size(); ++k) {
-    const Contender& contender = rows.front().timed[k].contender;
-    if (!contender.drawn) continue;
-    Series series{contender.name, {}, {}, Mark::both};
-    for (const Row& row : rows) {
-      const Timed& t = row.timed[k];
-      if (t.failed || t.frames == 0) continue;
-      series.x.push_back(row.links);
-      series.y.push_back(1e6 * t.per_frame());
-    }
-    chart.series.push_back(std::move(series));
-  }
-  place.figure("times", {&chart, 1});
-  return rows;
-}
-
-void ratios(const Place& place, const std::vector<Row>& rows) {
-  // chaotic motion grows harder to solve for with time: both are taken over the frames that both have run
-  std::string csv = "what,dofs,paper,measured,frames\n";
-  struct Claim {
-    const char *what, *slower, *faster;
-    double at_10, at_100;  // 0: the paper gives none
-  };
-  const Claim claims[] = {
-      {"DRNEA over SVI, with RIQN", "RIQN + SVI", "RIQN + DRNEA", 15, 32},
-      {"DRNEA over SVI, with Newton", "Newton + SVI", "Newton + DRNEA", 15, 32},
-      {"DRNEA over SVI, with Broyden", "Broyden + SVI", "Broyden + DRNEA", 15, 32},
-      {"DRNEA over sums of the same equation, with RIQN", "RIQN + SVI-log", "RIQN + DRNEA", 0, 0},
-      {"RIQN over Newton, with DRNEA", "Newton + DRNEA", "RIQN + DRNEA", 3.8, 53},
-      {"RIQN over Newton, with SVI", "Newton + SVI", "RIQN + SVI", 0, 0},
-      {"RIQN over Broyden, with DRNEA", "Broyden + DRNEA", "RIQN + DRNEA", 0, 0},
-      {"RIQN over Broyden with a kept Jacobian, with DRNEA", "Broyden, kept + DRNEA", "RIQN + DRNEA", 0, 0},
-      {"Newton in O(n) over dense Newton, with DRNEA", "Newton + DRNEA", "Newton O(n) + DRNEA", 0, 0},
-      {"Newton in O(n) over RIQN, with DRNEA", "RIQN + DRNEA", "Newton O(n) + DRNEA", 0, 0},
-      {"linden's default over RIQN, with DRNEA", "RIQN + DRNEA", "linden's default", 0, 0},
-  };
-  for (const Claim& claim : claims) {
-    for (const Row& row : rows) {
-      if (row.links != 10 && row.links != 100) continue;
-      const double paper = row.links == 10 ? claim.at_10 : claim.at_100;
-      const Timed *slower = row.find(claim.slower), *faster = row.find(claim.faster);
-      const int frames = slower && faster ? std::min(slower->frames, faster->frames) : 0;
-      const auto ratio = [&] { return slower->per_frame(frames) / faster->per_frame(frames); };
-      csv += fmt::format("\"{}\",{},{},{},{}\n", claim.what, row.links, paper > 0 ? fmt::format("{:g}", paper) : "",
-                         frames > 0 ? fmt::format("{:.2f}", ratio()) : "failed", frames);
-    }
-  }
-  place.table("ratios", csv);
-  std::cout << "\n" << csv;
-}
-
 Chart convergence_of(const std::string& title, const std::string& subtitle, Index links, double positions, Guess guess,
                      std::string& csv) {
   const Model model = paper_chain(links);
@@ -357,7 +124,7 @@ Chart convergence_of(const std::string& title, const std::string& subtitle, Inde
                          series.y[k]);
     }
     const bool newton = root_finding == RootFinding::newton_dense && evaluation == Evaluation::drnea;
-    if (newton) series.label = "Newton, dense or O(n), + DRNEA";  // the iterates of both are the same
+    if (newton) series.label.replace(0, std::string_view("Newton").size(), "Newton, dense or O(n),");  // the iterates of both are the same
     if (drawn) chart.series.push_back(std::move(series));
   };
   for (const RootFinding root_finding : {RootFinding::riqn, RootFinding::broyden, RootFinding::newton_dense}) {
@@ -394,11 +161,21 @@ void iterations(const Place& place) {
               {}};
   const auto run = [&](Contender contender) {
     Series series{contender.name, {}, {}, Mark::line};
+    int failed = 0;
     for (int frame = 1; frame <= kShown; ++frame) {
       const Frame found = contender.step();
-      if (!found.ok) break;
+      if (!found.ok) {
+        failed = frame;
+        break;
+      }
       series.x.push_back(frame);
       series.y.push_back(found.corrections);
+    }
+    if (series.y.empty()) {
+      csv += fmt::format("\"{}\",0,,,,\n", series.label);
+      series.label += ", fails in frame 1";
+      if (contender.drawn) chart.series.push_back(std::move(series));
+      return;
     }
     const double count = static_cast<double>(series.y.size());
     const double mean = std::accumulate(series.y.begin(), series.y.end(), 0.0) / count;
@@ -408,6 +185,7 @@ void iterations(const Place& place) {
     csv += fmt::format("\"{}\",{},{:.3f},{:.3f},{},{}\n", series.label, series.y.size(), mean, deviation,
                        *std::ranges::min_element(series.y), *std::ranges::max_element(series.y));
     series.label += fmt::format(" {:.2f} \u00b1 {:.2f}", mean, deviation);
+    if (failed > 0) series.label += fmt::format(", fails in frame {}", failed);
     if (contender.drawn) chart.series.push_back(std::move(series));
   };
   const double tolerance = paper_tolerance(kLinks);
@@ -425,10 +203,10 @@ void iterations(const Place& place) {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::paper
 
 int main(int argc, char** argv) {
-  using namespace linden;
+  using namespace linden::paper;
   if (argc < 4 || argc > 5) {
     std::cerr << "expected: bench_paper RESULTS FIGURES LABEL [SECONDS]\n";
     return 2;
@@ -439,7 +217,7 @@ int main(int argc, char** argv) {
     energy(place);
     convergence(place);
     iterations(place);
-    ratios(place, times(place, budget));
+    measure_times(place, budget);
   } catch (const std::exception& trouble) {
     std::cerr << trouble.what() << "\n";
     return 1;

@@ -5,7 +5,7 @@
 //
 //   Effects effects;
 //   effects.damping = urdf_damping(model);
-//   effects.servo.push_back({.row = elbow, .stiffness = 200, .damping = 20, .target = 0.4});
+//   effects.servos.push_back({.row = elbow, .stiffness = 200, .damping = 20, .target = 0.4});
 //   Simulation simulation(model, options, effects);
 #pragma once
 

@@ -88,6 +88,7 @@ struct AccuracyFit {
   AccuracyMethod method;
   double order = 0, from = 0, to = 0;  // largest and smallest step; order: NaN below three rows
   int rows = 0;
+  double error = 0;  // of the order: its standard error
 };
 
 struct AccuracyFigures {

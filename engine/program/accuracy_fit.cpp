@@ -33,10 +33,11 @@ std::vector<AccuracyFit> accuracy_fits(const AccuracyFigures& figures) {
     }
     std::erase_if(rows, [&](const AccuracyRow* row) { return row->error < 10 * floor; });
     if (rows.size() > kRows) rows.erase(rows.begin(), rows.end() - kRows);
-    AccuracyFit fit{method, std::numeric_limits<double>::quiet_NaN(), 0, 0, static_cast<int>(rows.size())};
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    AccuracyFit fit{method, kNone, 0, 0, static_cast<int>(rows.size()), kNone};
     LineFit line;
     for (const AccuracyRow* row : rows) line.add(std::log(row->step), std::log(row->error));
-    if (rows.size() == kRows) fit = {method, line.slope(), rows.front()->step, rows.back()->step, fit.rows};
+    if (rows.size() == kRows) fit = {method, line.slope(), rows.front()->step, rows.back()->step, fit.rows, line.slope_error()};
     fits.push_back(fit);
   }
   return fits;

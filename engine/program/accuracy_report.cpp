@@ -69,31 +69,55 @@ std::string note(const AccuracyRow& row) {
 std::string fit_text(const AccuracyFit& fit) {
   const std::string nominal = fmt::format("{} (nominal {})", name(fit.method), fit.method.order);
   if (!std::isfinite(fit.order)) return fmt::format("{}: too few steps between too coarse and exact", nominal);
-  return fmt::format("{}: error ~ h^{:.2f} from {} to {} ms", nominal, fit.order, milliseconds(fit.from), milliseconds(fit.to));
+  return fmt::format("{}: error ~ h^{:.2f} \u00b1 {:.1g} from {} to {} ms", nominal, fit.order, fit.error, milliseconds(fit.from),
+                     milliseconds(fit.to));
 }
 
-/// CPU time over steps, one series a method.
-plot::Chart chart_of(const AccuracyFigures& figures, double AccuracyRow::*value) {
+/// What a curve over steps from large to small lacks, and why; empty where it lacks nothing.
+std::string lacking(std::span<const AccuracyRow> rows) {
+  std::vector<std::string> failed;
+  double least = 0;  // step for which there was time
+  bool no_time = false;
+  for (const AccuracyRow& row : rows) {
+    if (!row.failure.empty()) failed.push_back(milliseconds(row.step));
+    if (row.left_out) no_time = true;
+    else least = row.step;
+  }
+  if (failed.size() == rows.size()) return ", failed at every step";
+  std::string text = failed.empty() ? "" : fmt::format(", failed at {} ms", fmt::join(failed, ", "));
+  if (no_time) text += least > 0 ? fmt::format(", no time below {} ms", milliseconds(least)) : ", no time";
+  return text;
+}
+
+/// Over CPU time, a curve for each method, with the order that its errors fall by where `fits` has it.
+plot::Chart chart_of(const AccuracyFigures& figures, double AccuracyRow::*value, const std::vector<AccuracyFit>& fits) {
   plot::Chart chart;
   chart.x = {"CPU time [s]", true};
   chart.y.log = true;
-  std::vector<AccuracyMethod> methods;
-  for (const AccuracyRow& row : figures.rows) {
-    if (row.of_ladder && (methods.empty() || methods.back() != row.method)) methods.push_back(row.method);
-  }
-  for (const AccuracyMethod& method : methods) {
-    plot::Series series{.label = name(method), .x = {}, .y = {}, .mark = plot::Mark::both};
-    for (const AccuracyRow& row : figures.rows) {
-      if (row.method != method || !row.of_ladder || !row.done() || !(row.*value > 0) || row.seconds <= 0) continue;
-      series.x.push_back(row.seconds);
-      series.y.push_back(row.*value);
-    }
-    if (!series.x.empty()) chart.series.push_back(std::move(series));
+  for (auto first = figures.rows.begin(); first != figures.rows.end();) {
+    const auto last = std::find_if(first, figures.rows.end(), [&](const AccuracyRow& row) { return row.method != first->method; });
+    const auto ladder_end = std::find_if(first, last, [](const AccuracyRow& row) { return !row.of_ladder; });
+    const auto fit = std::ranges::find(fits, first->method, &AccuracyFit::method);
+    const std::string slope = fit != fits.end() && std::isfinite(fit->order) ? fmt::format(", ~ h^{:.2f} \u00b1 {:.1g}", fit->order, fit->error) : "";
+    if (first != ladder_end) chart.series.push_back(accuracy_curve({first, ladder_end}, value, 1, slope));
+    first = last;
   }
   return chart;
 }
 
 }  // namespace
+
+plot::Series accuracy_curve(std::span<const AccuracyRow> rows, double AccuracyRow::*value, double units_per_second,
+                            const std::string& slope) {
+  plot::Series series{.label = name(rows.front().method) + slope + lacking(rows), .x = {}, .y = {}, .mark = plot::Mark::both};
+  for (const AccuracyRow& row : rows) {
+    if (!row.done() || !(row.*value > 0) || row.seconds <= 0) continue;
+    series.x.push_back(units_per_second * row.seconds);
+    series.y.push_back(row.*value);
+    series.notes.push_back(milliseconds(row.step));
+  }
+  return series;
+}
 
 std::vector<std::string> accuracy_advice(const AccuracyFigures& figures) {
   std::vector<std::string> lines;
@@ -205,6 +229,7 @@ nlohmann::ordered_json accuracy_json(const AccuracyArguments& arguments, const A
     fits.push_back({{"method", name(fit.method)},
                     {"nominal_order", fit.method.order},
                     {"order", if_any(true, fit.order)},
+                    {"order_error", if_any(true, fit.error)},
                     {"steps", fit.rows},
                     {"step_from", if_any(std::isfinite(fit.order), fit.from)},
                     {"step_to", if_any(std::isfinite(fit.order), fit.to)}});
@@ -246,19 +271,18 @@ nlohmann::ordered_json accuracy_json(const AccuracyArguments& arguments, const A
 
 std::vector<plot::Chart> accuracy_charts(const AccuracyArguments& arguments, const AccuracySetup& setup,
                                          const AccuracyFigures& figures) {
-  plot::Chart error = chart_of(figures, &AccuracyRow::error), energy = chart_of(figures, &AccuracyRow::band);
+  plot::Chart error = chart_of(figures, &AccuracyRow::error, accuracy_fits(figures)), energy = chart_of(figures, &AccuracyRow::band, {});
   error.title = fmt::format("What accuracy costs: {}", printable(setup.model->names.model));
   error.subtitle =
-      fmt::format("{:.6g} s, {}; start {}; steps {} to {} ms, large to small along each curve; reference: {}", figures.duration,
-                  gravity_text(setup.options), start_text(arguments), milliseconds(figures.rows.front().step),
-                  milliseconds(figures.rows.front().step / 64), reference_text(figures));
+      fmt::format("{:.6g} s, {}; start {}; beside the points: step h [ms]; reference: {}", figures.duration, gravity_text(setup.options),
+                  start_text(arguments), reference_text(figures));
   error.y.label = fmt::format("error at {:.4g} s [rad, m]", figures.reference.horizon);
   energy.title = "Energy";
-  energy.subtitle = fmt::format("largest less smallest total energy over {:.6g} s", figures.duration);
+  energy.subtitle = fmt::format("largest less smallest total energy over {:.6g} s; beside the points: step h [ms]", figures.duration);
   energy.y.label = "energy band, share of the largest kinetic energy";
   std::vector<plot::Chart> charts;
   for (plot::Chart* chart : {&error, &energy}) {
-    if (!chart->series.empty()) charts.push_back(std::move(*chart));
+    if (std::ranges::any_of(chart->series, [](const plot::Series& series) { return !series.x.empty(); })) charts.push_back(std::move(*chart));
   }
   return charts;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,11 @@ namespace linden {
 std::string accuracy_summary(const AccuracyArguments& arguments, const AccuracySetup& setup, const AccuracyFigures& figures);
 nlohmann::ordered_json accuracy_json(const AccuracyArguments& arguments, const AccuracySetup& setup,
                                      const AccuracyFigures& figures);
+/// A value over CPU time of the rows of one method, large steps first: the step [ms] beside each point. Steps that failed or were left out
+/// are named in the label, behind `slope`.
+plot::Series accuracy_curve(std::span<const AccuracyRow> rows, double AccuracyRow::*value, double units_per_second,
+                            const std::string& slope = "");
+
 /// Error and energy band over CPU time, a curve a method.
 std::vector<plot::Chart> accuracy_charts(const AccuracyArguments& arguments, const AccuracySetup& setup,
                                          const AccuracyFigures& figures);

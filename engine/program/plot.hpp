@@ -8,6 +8,7 @@
 // gaps    NaN, infinities, magnitudes from 1e300 and, on a log axis, values <= 0 are not drawn and break the line
 // ranges  come from the data. A constant gets room on both sides; when the values agree in so many digits that tick
 //         labels would grow long, ticks count from a round value that is named in the axis label.
+// notes   stand beside their points where no marker and no other note is in the way
 // styles  go by the position of the series in its panel: colours of different lightness, dashes, marker shapes.
 //         Text in an SVG is outlines; the words stand once more in its <title> and <desc>, for search and for screen
 //         readers.
@@ -30,6 +31,7 @@ struct Series {
   std::string label;  // stands at the end of the line; empty for none
   std::vector<double> x, y;
   Mark mark = Mark::line;
+  std::vector<std::string> notes{};  // beside each point, such as its step; those that have no room are left out. Empty: none
 };
 
 struct Axis {
@@ -45,7 +47,7 @@ struct Chart {
 };
 
 /// Draws the panels from top to bottom. Throws std::runtime_error that names the file and what to do: for an ending other
-/// than .svg or .png, a folder that is missing or not writable, a panel without a point to draw, unequal x and y.
+/// than .svg or .png, a folder that is missing or not writable, a panel without a point to draw, unequal x, y and notes.
 void draw(const std::string& file, std::span<const Chart> panels);
 void draw(const std::string& file, const Chart& chart);
 

@@ -60,8 +60,10 @@ void add_log_ticks(Scale& scale, double spacing) {
   const int first = static_cast<int>(std::floor(scale.lo)), last = static_cast<int>(std::ceil(scale.hi));
   const bool plain = first >= -4 && last <= 6;
   const bool digits_too = range < 2.2;  // too few decades: 2 and 5 get labels as well
+  const bool all_digits = 2 * spacing * range <= 1;  // else a decade has room for 2 and 5 alone, or for none
   for (int k = first; k <= last; ++k)
     for (int digit = 1; digit <= (stride == 1 ? 9 : 1); ++digit) {
+      if (!all_digits && digit != 1 && digit != 2 && digit != 5) continue;
       const double at = (k + std::log10(digit) - scale.lo) / range;
       if (at < -1e-9 || at > 1 + 1e-9) continue;
       const bool labelled = digit == 1 ? k % stride == 0 : digits_too && (digit == 2 || digit == 5);

@@ -238,6 +238,9 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
                                counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
                                order_text(options), options.step, counted(figures.run.steps, "step"), gravity_text(options), begin_text(arguments, figures),
                                energy.initial());
+  if (scaled && std::isfinite(energy.slope_error())) {
+    chart.subtitle += fmt::format("; slope {:+.1e} \u00b1 {:.1e} per second", energy.slope() / energy.scale(), energy.slope_error() / energy.scale());
+  }
   chart.x.label = "time [s]";
   const bool effects = !effect_lines(arguments.effects(), simulation.model()).empty();
   const char* drift = effects ? "H \u2212 H(0) \u2212 work of effects" : "H \u2212 H(0)";
@@ -281,8 +284,8 @@ std::vector<std::size_t> drawn_rows(const QuantityTrace& trace) {
 }  // namespace
 
 std::vector<plot::Chart> run_charts(const RunArguments& arguments, const Simulation& simulation, const RunFigures& figures) {
-  if (figures.traces.empty()) return {energy_chart(arguments, simulation, figures)};
   std::vector<plot::Chart> charts;
+  if (figures.traces.empty()) charts.push_back(energy_chart(arguments, simulation, figures));
   for (const QuantityTrace& trace : figures.traces) {
     plot::Chart& chart = charts.emplace_back();
     const std::vector<std::size_t> rows = drawn_rows(trace);
@@ -299,6 +302,10 @@ std::vector<plot::Chart> run_charts(const RunArguments& arguments, const Simulat
         series.y.push_back(point.y);
       }
     }
+  }
+  if (!figures.failure.empty()) {
+    std::string& subtitle = charts.front().subtitle;
+    subtitle += fmt::format("{}FAILED: {}", subtitle.empty() ? "" : "; ", printable(figures.failure));
   }
   return charts;
 }

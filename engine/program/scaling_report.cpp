@@ -55,10 +55,14 @@ std::vector<std::string> cells(const ScalingRow& row) {
   return result;
 }
 
+/// "1.014 ± 0.003", or without an error where two points leave none.
+std::string exponent_text(const PowerLaw& law) {
+  return fmt::format("{:.3f}{}", law.exponent, std::isfinite(law.error) ? fmt::format(" \u00b1 {:.3f}", law.error) : "");
+}
+
 std::string fit_text(Solver solver, const PowerLaw& law) {
   if (law.points < 2) return fmt::format("{}: {}", name(solver), law.points == 0 ? "no size to fit" : "nothing to fit to one size");
-  return fmt::format("{}: time ~ DOFs^{:.3f}{}, {} sizes from {} DOFs on", name(solver), law.exponent,
-                     std::isfinite(law.error) ? fmt::format(" \u00b1 {:.3f}", law.error) : "", law.points,
+  return fmt::format("{}: time ~ DOFs^{}, {} sizes from {} DOFs on", name(solver), exponent_text(law), law.points,
                      grouped(std::llround(law.least)));
 }
 
@@ -190,9 +194,11 @@ plot::Chart scaling_chart(const ScalingArguments& arguments, const ScalingFigure
   for (const Solver solver : arguments.solvers) {
     const PowerLaw law = scaling_fit(figures, solver);
     plot::Series series{.label = std::string(name(solver)), .x = {}, .y = {}, .mark = plot::Mark::both};
-    if (law.points >= 2) series.label += fmt::format(", slope {:.2f}", law.exponent);
+    if (law.points >= 2) series.label += fmt::format(", slope {}", exponent_text(law));
+    std::vector<std::string> failed;
     for (const ScalingRow& row : figures.rows) {
       if (row.solver != solver) continue;
+      if (row.failed()) failed.push_back(grouped(row.dofs));
       const double time = 1e6 * row.seconds_per_step();  // NaN where it failed: a gap
       series.x.push_back(row.dofs);
       series.y.push_back(time);
@@ -201,6 +207,7 @@ plot::Chart scaling_chart(const ScalingArguments& arguments, const ScalingFigure
       end = std::max<double>(end, row.dofs);
       least_per_dof = std::min(least_per_dof, time / row.dofs);
     }
+    if (!failed.empty()) series.label += fmt::format(", failed at {} DOFs", fmt::join(failed, "; "));
     chart.series.push_back(std::move(series));
   }
   if (begin < end) {

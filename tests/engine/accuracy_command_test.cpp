@@ -126,10 +126,17 @@ TEST_CASE("the pictures of an accuracy study name axes and methods", "[command l
   const Shell shell;
   REQUIRE(shell.linden("accuracy chain:2 --duration 0.2 --budget 60 --plot a.svg").exit_code == 0);
   for (const char* word : {"What accuracy costs", "CPU time [s]", "error at 0.192 s [rad, m]", "energy band", "order 8", "RK4",
-                           "semi-implicit Euler"}) {
+                           "semi-implicit Euler", "beside the points: step h [ms]", "(16, 8, 4, 2, 1, 0.5, 0.25);", "order 4, ~ h^"}) {
     CHECK_THAT(text_of(shell / "a.svg"), Contains(word));
   }
   CHECK(shell.files() == std::set<std::string>{"a.svg"});
+}
+
+TEST_CASE("the pictures of an accuracy study name the steps at which a method failed", "[command line]") {
+  const Shell shell;
+  // explicit steps of 16 ms blow up on a whipping chain within three seconds
+  REQUIRE(shell.linden("accuracy chain:3 --duration 3 --budget 60 --plot a.svg").exit_code == 0);
+  CHECK_THAT(text_of(shell / "a.svg"), Contains("semi-implicit Euler, failed at 16"));
 }
 
 TEST_CASE("a scene brings its start and its springs into the study", "[command line]") {

@@ -257,6 +257,15 @@ TEST_CASE("a step that fails ends the run with 1, names a body and keeps what is
   CHECK(shell.files() == std::set<std::string>{"a.csv", "a.json", "a.png"});
 }
 
+TEST_CASE("the picture of a run that failed says so, whatever it shows", "[command line]") {
+  const Shell shell;
+  for (const char* what : {"", " --what positions"}) {
+    INFO(what);
+    CHECK(shell.linden("run chain:10 --dt 10 --duration 100 --spread 1000 --plot a.svg" + std::string(what)).exit_code == 1);
+    CHECK_THAT(text_of(shell / "a.svg"), Contains("FAILED: ") && Contains("try a step"));
+  }
+}
+
 TEST_CASE("an interrupted run keeps what is good", "[command line]") {
   const Shell shell;
   const Outcome outcome = shell.interrupted("run chain:5 --duration 1e6 --record a.csv --json a.json --save a.checkpoint");

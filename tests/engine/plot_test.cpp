@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/program/plot.hpp"
+#include "engine/program/plot_pen.hpp"
 #include "engine/program/plot_scale.hpp"
 #include "tests/engine/folder.hpp"
 
@@ -88,6 +89,45 @@ TEST_CASE("a log axis has a labelled tick every decade, minor ones between, all 
 TEST_CASE("a log axis of many decades labels only some, and of few more than the decades") {
   CHECK(labels(plot::make_scale({"", true}, 1e-12, 1, 0, 0.2)).size() == 5);
   CHECK(labels(plot::make_scale({"", true}, 10, 100, 0, 0.1)) == std::vector<std::string>{"10", "20", "50", "100"});
+}
+
+TEST_CASE("a log axis with room for it labels every decade") {
+  // the axes of a panel of 210 pixels: 17 for a label
+  CHECK(labels(plot::make_scale({"", true}, 1e-10, 1, 0, 17.0 / 210)) ==
+        std::vector<std::string>{"1e\u221210", "1e\u22129", "1e\u22128", "1e\u22127", "1e\u22126", "1e\u22125", "1e\u22124", "1e\u22123", "1e\u22122", "1e\u22121", "1"});
+}
+
+TEST_CASE("notes stand beside their points, on no marker, on no other note and within the axes") {
+  const plot::Point area{100, 60};
+  const std::vector<plot::Point> points{{20, 30}, {20, 30}, {97, 30}, {3, 3}, {50, 58}, {std::nan(""), 10}};
+  std::vector<plot::Note> notes;
+  for (const plot::Point& point : points) notes.push_back({point, 12, 7});
+  const std::vector<plot::Point> places = plot::note_places(notes, points, area);
+  REQUIRE(places.size() == points.size());
+  CHECK((places[0].x > 20 && places[0].y < 30));  // right above
+  CHECK((places[1].x + 12 < 20 && places[1].y < 30));  // where the first has taken that, left
+  CHECK((places[2].x + 12 < 97 && places[2].y < 30));  // at the right edge, left
+  CHECK((places[3].x > 3 && places[3].y - 7 > 3));  // at the upper edge, below
+  CHECK((places[4].x > 50 && places[4].y < 58));  // at the lower edge, above
+  CHECK(std::isnan(places[5].x));  // a point that is not drawn has no note
+}
+
+TEST_CASE("a note without room is left out") {
+  const std::vector<plot::Point> crowd{{20, 30}, {26, 24}, {14, 24}, {26, 36}, {14, 36}};
+  const std::vector<plot::Point> places = plot::note_places({{crowd[0], 12, 7}}, crowd, {100, 60});
+  REQUIRE(places.size() == 1);
+  CHECK(std::isnan(places[0].x));
+}
+
+TEST_CASE("the words of a picture have its notes, and notes of another number than the points are refused") {
+  const Folder folder;
+  plot::Chart chart = wave(3);
+  chart.series[0].mark = plot::Mark::both;
+  chart.series[0].notes = {"16", "8", "4"};
+  plot::draw(folder.file("notes.svg"), chart);
+  CHECK_THAT(text_of(folder.file("notes.svg")), Catch::Contains("sine (16, 8, 4);"));
+  chart.series[0].notes.pop_back();
+  CHECK_THROWS_WITH(plot::draw(folder.file("fewer.svg"), chart), Catch::Contains("3 points and 2 notes"));
 }
 
 TEST_CASE("what cannot be drawn is refused with the reason, and no file appears") {
