@@ -5,7 +5,7 @@
 // Sweeps run what is decided, over their own order of memory:
 //
 //   Number, kLanes, kAlone                      double or a pack; how many instances; whether one can cut, take back, refactor, continue
-//   evaluate(lanes, corrections)                corrects the displacement of these lanes, the others' stays; the next evaluation of all
+//   evaluate(lanes, round)                      corrects the displacement of these lanes, the others' stays; the next evaluation of all
 //   converged(now), close(now)                  lanes whose residual is below the tolerance; nearly so
 //   at_floor(now, epsilons)                     lanes whose residual is rounding alone
 //   has_states(), revise(revision)              effects that stick, stop or saturate: lanes in which a state changed
@@ -82,15 +82,15 @@ class Solve {
     slow_ = (slow_ & ~whole) | (whole & ~L::bits(fell_fast(now_.norm, before_)));
     const Lanes converged = usable & sweeps_.converged(now_);
     const Lanes at_floor = floor(active & usable & ~converged, whole), solved = converged | at_floor;
-    if (whole != 0 && corrections_ == 1) sweeps_.first_correction(now_.norm, before_, at_floor != 0);
+    if (whole != 0 && corrections_[0] == 1) sweeps_.first_correction(now_.norm, before_, at_floor != 0);
     const Lanes changed = revised(active & usable & ~(cut_ & ~fell), solved);
-    const bool stale = corrections_ == 1 && corrected_ != 0 && sweeps_.stale(now_, before_);
+    const bool stale = corrections_[0] == 1 && corrected_ != 0 && sweeps_.stale(now_, before_);
     std::array<Lanes, kNexts> next{};
     for (int l = 0; l < W; ++l) {
       if ((active >> l & 1u) == 0) continue;
       const auto is = [l](Lanes lanes) { return (lanes >> l & 1u) != 0; };
       seen_ = {is(usable), is(solved), is(at_floor), is(changed), is(corrected_), is(taken_back_), is(fell), is(slow_), stale, is(fresh_),
-               corrections_, cuts_, updates_[at(l)]};
+               corrections_[at(l)], cuts_, updates_[at(l)]};
       const Next what = decide(policy_, seen_);
       next[static_cast<std::size_t>(what)] |= 1u << l;
       if constexpr (Sweeps::kAlone) {
@@ -135,9 +135,12 @@ class Solve {
     cut_ = taken_back_ = 0;
     cuts_ = 0;
     share_ = 1;
-    if (lanes != 0) corrections_ += 1;
-    for (int l = 0; l < W; ++l) solved.evaluations[at(l)] += static_cast<int>(active >> l & 1u);
-    now_ = sweeps_.evaluate(lanes, corrections_);
+    for (int l = 0; l < W; ++l) {
+      corrections_[at(l)] += static_cast<int>(lanes >> l & 1u);
+      solved.evaluations[at(l)] += static_cast<int>(active >> l & 1u);
+    }
+    rounds_ += 1;
+    now_ = sweeps_.evaluate(lanes, rounds_);
   }
 
   /// Of a tree that is stepped alone: all but the next correction.
@@ -161,7 +164,7 @@ class Solve {
             sweeps_.continuation(now_, updates_[0] == policy_.last_continuation);
           }
           updates_[0] += 1;
-          now_ = sweeps_.evaluate(0, corrections_);
+          now_ = sweeps_.evaluate(0, rounds_);
         }
         fresh_ = 1;
       }
@@ -174,8 +177,8 @@ class Solve {
   S before_ = S(0.0);  // norm that the correction met
   Seen seen_;
   Lanes corrected_ = 0, cut_ = 0, taken_back_ = 0, slow_ = 0, fresh_ = 0;
-  int corrections_ = 0, cuts_ = 0;
-  std::array<int, W> updates_{};
+  int rounds_ = 0, cuts_ = 0;
+  std::array<int, W> corrections_{}, updates_{};
   double share_ = 1;  // of the correction that is tried
 };
 

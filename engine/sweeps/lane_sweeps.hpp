@@ -112,8 +112,8 @@ class LaneSweeps {
   }
 
   // what solve.hpp asks
-  Evaluated<Pack> evaluate(Lanes corrected, int corrections) {
-    return evaluated<false>(correct_down(tree_, constants_, L::mask(corrected), work_), corrections % 2 == 0);
+  Evaluated<Pack> evaluate(Lanes corrected, int round) {
+    return evaluated<false>(correct_down(tree_, constants_, L::mask(corrected), work_), round % 2 == 0);
   }
   Lanes converged(const Evaluated<Pack>& now) const { return L::bits(within(now.norm, tolerance_squared_, now.scale)); }
   Lanes close(const Evaluated<Pack>&) const { return 0; }
