@@ -59,7 +59,7 @@ class BaselineMover final : public Mover {
 
 class SingleMover final : public Mover {
  public:
-  SingleMover(const AccuracySetup& setup, const Options& options) : batch_(setup.model, 1, batch_options(options), setup.effects) {
+  SingleMover(const AccuracySetup& setup, const Options& options) : batch_(setup.model, 1, stepping(options), setup.effects, {.threads = 1}) {
     ComposedMover start(setup, options);
     std::vector<double> v = setup.start.velocities;
     if (v.empty()) v.resize(static_cast<std::size_t>(setup.model->tree.shape.velocities));
@@ -84,13 +84,7 @@ class SingleMover final : public Mover {
   std::string failure() const override { return batch_.describe(0); }
 
  private:
-  static BatchOptions batch_options(const Options& options) {
-    BatchOptions result;
-    result.step = options.step;
-    result.gravity = options.gravity;
-    result.threads = 1;
-    return result;
-  }
+  static Options stepping(const Options& options) { return {.step = options.step, .gravity = options.gravity}; }
   FloatBatch batch_;
   std::vector<double> positions_;
 };

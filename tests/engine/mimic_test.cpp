@@ -377,9 +377,7 @@ TEST_CASE("instances with massless followers, friction and limits move as a simu
   effects.friction = {{.row = 0, .force = 1e-3}};
   effects.limits = {{.row = 0, .lower = -1, .upper = 0.5}};
   const auto run_batch = [&](std::int64_t size, int threads, std::initializer_list<int> parts) {
-    BatchOptions options;
-    options.threads = threads;
-    Batch batch(model, size, options, effects);
+    Batch batch(model, size, {}, effects, {.threads = threads});
     for (std::int64_t i = 0; i < size; ++i) {
       batch.reset(i, std::vector<double>(3, 0.0), std::vector<double>{0.5 * static_cast<double>(i % 5) - 2, 0, 0});
     }
