@@ -29,8 +29,11 @@
 #include <type_traits>
 #include <vector>
 
-#include "engine/solve/block_stepper.hpp"
+#include "engine/instance_record.hpp"
+#include "engine/options.hpp"
+#include "engine/solve/instructions.hpp"
 #include "layout/effects.hpp"
+#include "layout/model.hpp"
 
 namespace linden {
 

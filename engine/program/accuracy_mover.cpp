@@ -76,8 +76,8 @@ class SingleMover final : public Mover {
   }
   std::optional<Momentum> momentum() override { return std::nullopt; }
   std::span<const double> positions() override {
-    Eigen::Map<Eigen::VectorXd>(positions_.data(), static_cast<Eigen::Index>(positions_.size())) =
-        batch_.positions().instance(0).cast<double>();
+    const auto found = batch_.positions();
+    for (std::size_t row = 0; row < positions_.size(); ++row) positions_[row] = static_cast<double>(found(0, static_cast<Index>(row)));
     return positions_;
   }
   std::int64_t evaluations() const override { return batch_.summary().evaluations; }

@@ -10,23 +10,21 @@
 #include <span>
 #include <vector>
 
-#include "engine/effects/effect_plan.hpp"
 #include "engine/effects/effect_work.hpp"
 #include "engine/effects/step_impulses.hpp"
+#include "engine/energy.hpp"
 #include "engine/options.hpp"
 #include "engine/step_report.hpp"
-#include "kernels/values/spatial.hpp"
 #include "layout/state.hpp"
 
 namespace linden {
 
-struct Energy {
-  double kinetic = 0;    // 1/2 p.M^-1 p [J]
-  double potential = 0;  // of gravity (zero where the centre of mass is at the height of the world's origin), springs and ground [J]
-  double springs = 0, ground = 0;  // their shares of it
-  double total() const { return kinetic + potential; }
-  double gravity() const { return potential - springs - ground; }
-};
+struct EffectPlan;
+struct Model;
+template <class Scalar>
+struct BodyConstants;
+template <class Scalar>
+struct Wrench;  // kernels/values/spatial.hpp
 
 /// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading).
 struct EffectMemory {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/effects/effect_plan.hpp"
+
 namespace linden {
 
 std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const EffectPlan& plan) {

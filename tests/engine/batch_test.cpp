@@ -8,6 +8,7 @@
 #include "engine/initial_state.hpp"
 #include "engine/simulation.hpp"
 #include "layout/support/input_error.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 

@@ -7,6 +7,7 @@
 #include "engine/drift.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "folder.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 

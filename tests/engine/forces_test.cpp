@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/random.hpp"
 #include "scenes.hpp"
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "engine/batch.hpp"
+#include "engine/effects/effect_plan.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "layout/support/input_error.hpp"
 #include "models/build/builder.hpp"

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 
