@@ -45,7 +45,7 @@ class AlonePeer : public Peer {
 template <class Real>
 class BatchPeer : public Peer {
  public:
-  BatchPeer(const Robot& robot, const Plan& plan) : batch_(robot.model, plan.instances, options(plan)) {}
+  BatchPeer(const Robot& robot, const Plan& plan) : batch_(robot.model, plan.instances, options(plan), {}, {.threads = plan.threads}) {}
 
   double mass() const override { return mass_distribution(batch_.model(), batch_.model().neutral()).mass; }
   Index degrees_of_freedom() const override { return batch_.model().degrees_of_freedom(); }
@@ -66,13 +66,7 @@ class BatchPeer : public Peer {
   }
 
  private:
-  static BatchOptions options(const Plan& plan) {
-    BatchOptions chosen;
-    chosen.step = plan.step;
-    chosen.gravity = {0, 0, -plan.gravity};
-    chosen.threads = plan.threads;
-    return chosen;
-  }
+  static Options options(const Plan& plan) { return {.step = plan.step, .gravity = {0, 0, -plan.gravity}}; }
 
   BatchOf<Real> batch_;
 };

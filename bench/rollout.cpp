@@ -24,7 +24,7 @@ constexpr std::int64_t kStepsAtOnce = 20, kEpisode = 2000;
 
 template <class Real>
 void rollout(benchmark::State& state, const std::shared_ptr<const Model>& model, std::int64_t size, const BatchOptions& options) {
-  BatchOf<Real> batch(model, size, options);
+  BatchOf<Real> batch(model, size, {}, {}, options);
   const auto start_all = [&] {
     batch.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
       const InitialState start = random_state(*model, static_cast<std::uint64_t>(i) + 1, 0.3);
@@ -69,9 +69,7 @@ void rollout(benchmark::State& state, const std::shared_ptr<const Model>& model,
 void add(const std::string& scene, const std::shared_ptr<const Model>& model, std::int64_t size, int threads,
          std::optional<Instructions> instructions, bool single) {
   if (instructions && !available(*instructions)) return;
-  BatchOptions options;
-  options.threads = threads;
-  options.instructions = instructions;
+  const BatchOptions options{.threads = threads, .instructions = instructions};
   const std::string name = fmt::format("{}/{}/threads:{}/{}/{}", scene, size, threads,
                                        linden::name(instructions.value_or(best_instructions())), single ? "float" : "double");
   const auto run = [=](benchmark::State& state) {

@@ -11,8 +11,13 @@
 #include <cmath>
 #include <thread>
 
+#include "engine/effects/effect_plan.hpp"
+#include "engine/randomization.hpp"
 #include "engine/required_model.hpp"
+#include "engine/scene/scene.hpp"
+#include "engine/solve/block_stepper.hpp"
 #include "engine/solve/instance_stepper.hpp"
+#include "engine/start_check.hpp"
 #include "engine/threads.hpp"
 #include "layout/packed_history.hpp"
 #include "layout/support/input_error.hpp"
@@ -20,12 +25,12 @@
 namespace linden {
 namespace {
 
-void check_batch(std::int64_t size, const BatchOptions& options) {
+void check_batch(std::int64_t size, const Options& options, const BatchOptions& computed) {
   check(options);
   constexpr std::int64_t most = 1'000'000'000;
   if (size < 1 || size > most) throw InputError(fmt::format("{} instances; expected 1 to {}", size, most));
-  if (options.threads < 0 || options.threads > 4096) {
-    throw InputError(fmt::format("{} threads; expected 1 to 4096, or 0 for all there are", options.threads));
+  if (computed.threads < 0 || computed.threads > 4096) {
+    throw InputError(fmt::format("{} threads; expected 1 to 4096, or 0 for all there are", computed.threads));
   }
   const auto refuse = [](const char* what, std::string_view found, std::string_view only) {
     throw InputError(fmt::format("a batch has no {} \"{}\"; it knows \"{}\" (a Simulation has them all)", what, found, only));
@@ -35,9 +40,9 @@ void check_batch(std::int64_t size, const BatchOptions& options) {
   if (options.solver != Solver::newton) refuse("solver", name(options.solver), name(Solver::newton));
   if (options.guess != FirstGuess::extrapolation) refuse("first guess", name(options.guess), name(FirstGuess::extrapolation));
   if (options.stop != StopTest::energy) refuse("stop test", name(options.stop), name(StopTest::energy));
-  if (options.instructions && !available(*options.instructions)) {
+  if (computed.instructions && !available(*computed.instructions)) {
     throw InputError(fmt::format("this processor or this build of linden has no {} instructions; the best there is: {}",
-                                 name(*options.instructions), name(best_instructions())));
+                                 name(*computed.instructions), name(best_instructions())));
   }
 }
 
@@ -84,7 +89,7 @@ struct BatchOf<Real>::Data {
 
   std::shared_ptr<const Model> model;
   BodyConstants<Real> constants;
-  BatchOptions options;
+  Options options;
   std::int64_t size, blocks;
   Instructions instructions;
   int lanes;
@@ -97,10 +102,10 @@ struct BatchOf<Real>::Data {
   mutable oneapi::tbb::task_arena arena;
   mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
 
-  Data(std::shared_ptr<const Model> shared, std::int64_t count, const BatchOptions& given, const Effects& effects)
+  Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects, const BatchOptions& computed)
       : model(std::move(shared)), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
-        instructions(given.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
-        threads(given.threads > 0 ? given.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
+        instructions(computed.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
+        threads(computed.threads > 0 ? computed.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
         plan(*model, options, effects),
         allowed(oneapi::tbb::global_control::max_allowed_parallelism,
                 std::max(static_cast<std::size_t>(threads),
@@ -193,6 +198,10 @@ struct BatchOf<Real>::Data {
   }
 
   void check_instance(std::int64_t i) const { require_one_of("instance", i, 0, size - 1); }
+  void check_count(const char* what, std::size_t found, Index expected) const {
+    if (found == static_cast<std::size_t>(expected)) return;
+    throw InputError(fmt::format("{}: {} numbers given for model \"{}\", expected {}", what, found, model->names.model, expected));
+  }
   void check_body(Index slot) const { require_one_of("body", slot, 1, model->tree.bodies()); }
 
   void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
@@ -236,14 +245,33 @@ void require_one_of(const char* what, std::int64_t found, std::int64_t first, st
 }
 
 template <class Real>
-BatchOf<Real>::BatchOf(Model model, std::int64_t size, const BatchOptions& options, const Effects& effects)
-    : BatchOf(std::make_shared<const Model>(std::move(model)), size, options, effects) {}
+BatchOf<Real>::BatchOf(Model model, std::int64_t size, const Options& options, const Effects& effects, const BatchOptions& computed)
+    : BatchOf(std::make_shared<const Model>(std::move(model)), size, options, effects, computed) {}
 
 template <class Real>
-BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options, const Effects& effects) {
-  check_batch(size, options);
-  data_ = std::make_unique<Data>(required(std::move(model)), size, options, effects);
+BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const Options& options, const Effects& effects,
+                       const BatchOptions& computed) {
+  check_batch(size, options, computed);
+  data_ = std::make_unique<Data>(required(std::move(model)), size, options, effects, computed);
   if (!effects.motions.empty()) reset_all([](std::int64_t, std::span<double>, std::span<double>) {});
+}
+
+template <class Real>
+BatchOf<Real>::BatchOf(const Scene& scene, std::int64_t size, const BatchOptions& computed)
+    : BatchOf(scene.model, size, scene.options, scene.effects, computed) {
+  const std::vector<double> start = checked_start(scene);
+  if (!start.empty()) data_->check_count("positions", start.size(), data_->shape().positions);
+  const std::vector<double>& rates = scene.initial.velocities;
+  if (!rates.empty()) data_->check_count("velocities", rates.size(), data_->shape().velocities);
+  const auto randomize = [&](std::int64_t i) {
+    apply(draw(scene.randomization, scene.model, scene.effects, scene.seed + static_cast<std::uint64_t>(i)), scene.effects, *this, i);
+  };
+  if (scene.randomization.any()) randomize(0);  // makes room, before there are several threads
+  reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
+    if (scene.randomization.any()) randomize(i);
+    std::ranges::copy(start, positions.begin());
+    std::ranges::copy(rates, velocities.begin());
+  });
 }
 
 template <class Real>
@@ -258,7 +286,7 @@ const Model& BatchOf<Real>::model() const {
   return *data_->model;
 }
 template <class Real>
-const BatchOptions& BatchOf<Real>::options() const {
+const Options& BatchOf<Real>::options() const {
   return data_->options;
 }
 template <class Real>
@@ -281,12 +309,8 @@ Instructions BatchOf<Real>::instructions() const {
 template <class Real>
 void BatchOf<Real>::reset(std::int64_t i, std::span<const double> positions, std::span<const double> velocities) {
   data_->check_instance(i);
-  const auto check_count = [&](const char* what, std::size_t found, Index expected) {
-    if (found == static_cast<std::size_t>(expected)) return;
-    throw InputError(fmt::format("{}: {} numbers given for model \"{}\", expected {}", what, found, model().names.model, expected));
-  };
-  check_count("positions", positions.size(), data_->shape().positions);
-  check_count("velocities", velocities.size(), data_->shape().velocities);
+  data_->check_count("positions", positions.size(), data_->shape().positions);
+  data_->check_count("velocities", velocities.size(), data_->shape().velocities);
   data_->start(i, positions, velocities, *data_->worker().instance);
 }
 

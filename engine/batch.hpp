@@ -1,6 +1,7 @@
 // engine/batch.hpp
 // N instances of one model in time: rollouts over lanes and threads.
 //
+//   Batch batch(load_scene("models/scenes/humanoid_drop.yaml"), 4096);                       every instance as its scene says
 //   Batch batch(load_urdf("models/humanoid.urdf", Base::floating), 4096, {.step = 1e-3});
 //   for (std::int64_t i = 0; i < batch.size(); ++i) batch.reset(i, q, v);
 //   batch.step(100);
@@ -28,14 +29,20 @@
 #include <type_traits>
 #include <vector>
 
-#include "engine/solve/block_stepper.hpp"
+#include "engine/instance_record.hpp"
+#include "engine/options.hpp"
+#include "engine/solve/instructions.hpp"
 #include "layout/effects.hpp"
+#include "layout/model.hpp"
 
 namespace linden {
 
-struct BatchOptions : Options {
-  int threads = 0;                           // 0: all that the machine has
-  std::optional<Instructions> instructions;  // none: the best that the processor has
+struct Scene;
+
+/// What a batch is computed with. No result depends on the threads; with other instructions results differ by rounding.
+struct BatchOptions {
+  int threads = 0;                             // 0: all that the machine has
+  std::optional<Instructions> instructions{};  // none: the best that the processor has
 };
 
 /// Throws InputError where `found` is none of first..last, which are called `what`.
@@ -90,14 +97,18 @@ class BatchOf {
   /// Every instance at rest in the model's zero configuration. Throws InputError for options that make no sense or that a batch does not
   /// have: it solves by Newton's method, starts from extrapolation and stops by energy. Here and below an instance or a body that there is
   /// not, and a null pointer, are InputErrors too.
-  BatchOf(Model model, std::int64_t size, const BatchOptions& options = {}, const Effects& effects = {});
-  BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const BatchOptions& options = {}, const Effects& effects = {});
+  BatchOf(Model model, std::int64_t size, const Options& options = {}, const Effects& effects = {}, const BatchOptions& computed = {});
+  BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const Options& options = {}, const Effects& effects = {},
+          const BatchOptions& computed = {});
+  /// Every instance at the start of the scene (engine/scene/scene.hpp), which is looked at as that of a Simulation is; of what the scene
+  /// randomises, instance i has what the seed scene.seed + i draws, the first instance that of Simulation(scene). A reset keeps it.
+  explicit BatchOf(const Scene& scene, std::int64_t size, const BatchOptions& computed = {});
   ~BatchOf();
   BatchOf(BatchOf&&) noexcept;
   BatchOf& operator=(BatchOf&&) noexcept;
 
   const Model& model() const;
-  const BatchOptions& options() const;
+  const Options& options() const;
   std::int64_t size() const;
   int lanes() const;
   int threads() const;

@@ -20,8 +20,10 @@
 #include <system_error>
 
 #include "engine/effects/effect_owners.hpp"
+#include "engine/effects/effect_plan.hpp"
 #include "engine/files/output_file.hpp"
 #include "engine/simulation.hpp"
+#include "engine/solve/stepper.hpp"
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
 

@@ -1,5 +1,6 @@
 #include "engine/drift.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>

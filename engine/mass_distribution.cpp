@@ -1,5 +1,6 @@
 #include "engine/mass_distribution.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <vector>
 
@@ -20,6 +21,7 @@ MassDistribution mass_distribution(const Model& model, std::span<const double> q
 
   std::vector<Isometry3d> pose(static_cast<std::size_t>(tree.shape.slots), Isometry3d::Identity());
   MassDistribution result;
+  Vector3d center = Vector3d::Zero();
   for (Index i = 1; i < tree.shape.slots; ++i) {
     Isometry3d in_parent = Isometry3d::Identity();
     for (int row = 0; row < 3; ++row) {
@@ -31,10 +33,11 @@ MassDistribution mass_distribution(const Model& model, std::span<const double> q
     const Vector3d moment = body.linear() * Vector3d(inertia(1), inertia(2), inertia(3));
     const Vector3d p = body.translation();
     result.mass += inertia(0);
-    result.center += moment + inertia(0) * p;
+    center += moment + inertia(0) * p;
     result.polar_moment += inertia(0) * p.squaredNorm() + 2 * p.dot(moment) + 0.5 * (inertia(4) + inertia(7) + inertia(9));
   }
-  if (result.mass > 0) result.center /= result.mass;
+  if (result.mass > 0) center /= result.mass;
+  result.center = {center.x(), center.y(), center.z()};
   return result;
 }
 

@@ -2,7 +2,7 @@
 // Where the mass of a whole system is.
 #pragma once
 
-#include <Eigen/Core>
+#include <array>
 #include <span>
 
 #include "layout/model.hpp"
@@ -10,9 +10,9 @@
 namespace linden {
 
 struct MassDistribution {
-  double mass = 0;                                   // [kg]
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  // of mass, in the world's frame [m]
-  double polar_moment = 0;                           // integral of r^2 dm about the world's origin [kg m^2]
+  double mass = 0;                 // [kg]
+  std::array<double, 3> center{};  // of mass, in the world's frame [m]
+  double polar_moment = 0;         // integral of r^2 dm about the world's origin [kg m^2]
 };
 
 /// At positions q [nq].

@@ -41,6 +41,9 @@ struct Options {
   int max_splits = 8;      // a step that fails is split in two this many times over: down to h / 256
 };
 
+/// Of single precision nothing better can be asked: rounding leaves about so much of the residual.
+inline constexpr double kSingleTolerance = 3e-6;
+
 /// What files and command lines that name none mean: 1e-10 for order 2, 1e-12 for order 4, 1e-13 for 6 and 8. Higher orders are worth their
 /// price only where the solves are as exact as they: at 1e-10 the humanoid strays by 1e-8 in a second whatever the step, at 1e-13 by
 /// 5e-12, for a tenth more evaluations at most.

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/compose/composition.hpp"
+#include "engine/effects/effect_plan.hpp"
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
 #include "engine/solve/instance_stepper.hpp"
@@ -54,6 +55,11 @@ Simulation::Simulation(const std::shared_ptr<const Scene>& instance) : Simulatio
   if (const std::vector<double> positions = checked_start(*instance); !positions.empty()) set_positions(positions);
   if (!instance->initial.velocities.empty()) set_velocities(instance->initial.velocities);
 }
+
+Simulation::~Simulation() = default;
+Simulation::Simulation(Simulation&&) noexcept = default;
+
+const Effects& Simulation::effects() const { return plan_->effects; }
 
 void Simulation::check_row_count(const char* what, std::size_t found, Index expected) const {
   if (found != static_cast<std::size_t>(expected)) {

@@ -21,20 +21,23 @@
 #include <string>
 #include <vector>
 
+#include "engine/effects/effect_work.hpp"
 #include "engine/effects/passive_watch.hpp"
+#include "engine/effects/step_impulses.hpp"
+#include "engine/energy.hpp"
 #include "engine/guess/stage_guess.hpp"
-#include "engine/solve/stepper.hpp"
+#include "engine/options.hpp"
+#include "engine/step_report.hpp"
 #include "layout/effects.hpp"
+#include "layout/model.hpp"
+#include "layout/state.hpp"
 
 namespace linden {
 
+struct EffectPlan;
 struct Scene;
-
-/// Of the whole system, about the world's origin and in the world's frame.
-struct Momentum {
-  std::array<double, 3> angular{};  // [kg m^2/s]
-  std::array<double, 3> linear{};   // [kg m/s]
-};
+class Stepper;
+enum class Then : std::uint8_t;  // engine/solve/stepper.hpp
 
 /// How the ground holds a body, in the step taken last.
 struct BodyContact {
@@ -51,11 +54,13 @@ class Simulation {
   /// At the start of the scene (engine/scene/scene.hpp), with what its seed draws of what is randomised. Throws InputError too where that lies outside limits, contradicts ties or is in the
   /// ground, unless the scene takes it as given (engine/start_check.hpp). Positions that are set later are not looked at.
   explicit Simulation(const Scene& scene);
+  ~Simulation();
+  Simulation(Simulation&&) noexcept;
 
   const Model& model() const { return *model_; }
   const Options& options() const { return options_; }
   /// As they act: what stood on followers of mimic joints is on their leaders.
-  const Effects& effects() const { return plan_->effects; }
+  const Effects& effects() const;
   double time() const { return static_cast<double>(steps_) * options_.step; }
   std::int64_t steps() const { return steps_; }
 

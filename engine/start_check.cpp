@@ -8,6 +8,7 @@
 #include <span>
 #include <unordered_map>
 
+#include "engine/effects/effect_plan.hpp"
 #include "engine/scene/scene.hpp"
 #include "kernels/effects/ground.hpp"
 #include "kernels/effects/terrain_height.hpp"
@@ -66,7 +67,7 @@ std::string StartFindings::text() const {
 }
 
 StartCheck::StartCheck(const Model& model, const Options& options, const Effects& effects)
-    : model_(model), plan_(model, options, effects), sag_(at(model.tree.shape.slots), 0.0), root_(at(model.tree.shape.slots), 0) {
+    : model_(model), plan_(std::make_unique<const EffectPlan>(model, options, effects)), sag_(at(model.tree.shape.slots), 0.0), root_(at(model.tree.shape.slots), 0) {
   if (!effects.ground) return;
   const auto& g = options.gravity;
   const double weight = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
@@ -76,6 +77,8 @@ StartCheck::StartCheck(const Model& model, const Options& options, const Effects
     if (is_root) sag_[at(i)] = model.constants.subtree_mass(i) * weight / effects.ground->stiffness;
   }
 }
+
+StartCheck::~StartCheck() = default;
 
 StartFindings StartCheck::look(std::span<const double> positions) const {
   StartFindings found;
@@ -117,10 +120,10 @@ void StartCheck::look_at_ties(StartFindings& found) const {
 }
 
 void StartCheck::look_at_limits(StartFindings& found) const {
-  if (plan_.effects.limits.empty()) return;
+  if (plan_->effects.limits.empty()) return;
   const std::unordered_map<Index, Index> screws = screws_of(model_);
   std::vector<std::string> lines;
-  for (const JointLimit& limit : plan_.effects.limits) {
+  for (const JointLimit& limit : plan_->effects.limits) {
     const Index slot = screws.at(limit.row);
     double& q = found.positions[at(model_.tree.first_q(slot))];
     const double bound = std::clamp(q, limit.lower, limit.upper), beyond = std::abs(q - bound);
@@ -144,7 +147,7 @@ void StartCheck::look_at_limits(StartFindings& found) const {
 double StartCheck::allowed(Index slot) const { return std::max(kShallow, sag_[at(root_[at(slot)])]); }
 
 void StartCheck::look_at_ground(StartFindings& found) const {
-  if (plan_.ground.points.empty()) return;
+  if (plan_->ground.points.empty()) return;
   const Tree& tree = model_.tree;
   Field<double> q;
   q.allocate(tree.shape.positions);
@@ -155,18 +158,18 @@ void StartCheck::look_at_ground(StartFindings& found) const {
   placement_map(tree, model_.constants, q, placement);
   world_placement_down(tree, placement, pose);
   GroundPoints<double> points;
-  points.allocate({.slots = static_cast<Index>(plan_.ground.points.size())});
-  find_ground(plan_.ground, pose, points);
+  points.allocate({.slots = static_cast<Index>(plan_->ground.points.size())});
+  find_ground(plan_->ground, pose, points);
 
   std::map<Index, double> depth, across;  // of the deepest point of a body that is too deep: a fault, and to be told
-  const bool level = !plan_.ground.ground.terrain;
-  for (std::size_t k = 0; k < plan_.ground.points.size(); ++k) {
-    const GroundPoint& point = plan_.ground.points[k];
+  const bool level = !plan_->ground.ground.terrain;
+  for (std::size_t k = 0; k < plan_->ground.points.size(); ++k) {
+    const GroundPoint& point = plan_->ground.points[k];
     const auto note = [&](std::map<Index, double>& depths, double deep) {
       if (deep > allowed(point.slot)) depths[point.slot] = std::max(depths[point.slot], deep);
     };
     note(level ? depth : across, -points.gap(static_cast<Index>(k)));
-    if (!level && point.block < 0 && point.begins_candidate()) note(depth, depth_below(plan_.ground, point, pose));
+    if (!level && point.block < 0 && point.begins_candidate()) note(depth, depth_below(plan_->ground, point, pose));
   }
   for (const auto& [slot, deep] : across) {
     if (depth.contains(slot)) continue;

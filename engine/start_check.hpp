@@ -13,18 +13,18 @@
 // Speeds are not looked at. What each fault says: joint or link, value, limit, what to do.
 #pragma once
 
-#include <optional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "engine/effects/effect_plan.hpp"
 #include "engine/options.hpp"
 #include "layout/effects.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
 
+struct EffectPlan;
 struct Scene;
 
 inline constexpr double kWrittenDigits = 1e-4;
@@ -47,6 +47,7 @@ class StartCheck {
  public:
   /// Throws InputError for effects that make no sense for the model.
   StartCheck(const Model& model, const Options& options, const Effects& effects);
+  ~StartCheck();
 
   /// positions [nq]; empty: the zero configuration.
   StartFindings look(std::span<const double> positions) const;
@@ -62,7 +63,7 @@ class StartCheck {
   void follow(std::vector<double>& positions) const;
 
   const Model& model_;
-  EffectPlan plan_;
+  std::unique_ptr<const EffectPlan> plan_;
   std::vector<double> sag_;  // of the tree that hangs on each root, by root's slot [m]
   std::vector<Index> root_;  // [slots]
 };

@@ -2,23 +2,19 @@
 // What the slots and rows of a tree are called: read by people and messages, never by a sweep.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "layout/field.hpp"
+#include "layout/pose.hpp"
 
 namespace linden {
 
-/// Rotation and shift. Unaligned: Eigen's own alignment depends on the processor that a file is compiled for, and those who link against
-/// linden may compile for another than linden did.
-using Pose = Eigen::Transform<double, 3, Eigen::Isometry, Eigen::DontAlign>;
-
 /// Where a link of the source ended up: a link behind a fixed joint is part of another body.
 struct LinkPlace {
-  Index slot = 0;                   // body that carries the link; 0 = fixed to the world
-  Pose in_body = Pose::Identity();  // link frame in the body's frame
+  Index slot = 0;  // body that carries the link; 0 = fixed to the world
+  Pose in_body;    // link frame in the body's frame
 };
 
 struct Names {

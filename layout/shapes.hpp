@@ -14,7 +14,8 @@
 #include <cstdint>
 #include <string>
 
-#include "layout/names.hpp"
+#include "layout/field.hpp"
+#include "layout/pose.hpp"
 
 namespace linden {
 
@@ -28,7 +29,7 @@ struct CollisionShape {
 
 /// A shape of a link; the centre of all but meshes is the pose's.
 struct LinkShape {
-  Pose pose = Pose::Identity();  // in the link's frame
+  Pose pose;  // in the link's frame
   CollisionShape shape;
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/compose/composition.hpp"
+#include "engine/effects/effect_plan.hpp"
 #include "engine/solve/instance_stepper.hpp"
 #include "kernels/effects/armature.hpp"
 #include "kernels/effects/ball_spring.hpp"
@@ -14,6 +15,7 @@
 #include "kernels/tree/gravity.hpp"
 #include "kernels/tree/impulse_up.hpp"
 #include "kernels/tree/increment_down.hpp"
+#include "kernels/tree/mimic.hpp"
 #include "kernels/tree/motion_map.hpp"
 #include "kernels/tree/placement_map.hpp"
 #include "kernels/tree/velocity_down.hpp"
@@ -45,8 +47,8 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
       scheme_(scheme),
       options_(options),
       gravity_(options.gravity != std::array<double, 3>{0, 0, 0}),
-      plan_(*model_, options, effects),
-      ties_(model_->mimics, model_->tree) {
+      plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
+      ties_(std::make_unique<MimicTies<double>>(model_->mimics, model_->tree)) {
   check(options);
   if (const std::string refused = sudden(effects); !refused.empty()) {
     throw InputError(fmt::format("{} has no forces that change suddenly; the scene has {}", name(scheme), refused));
@@ -56,9 +58,11 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
   for (Field<double>* field : {&v_, &good_v_, &stage_u_, &stage_v_, &rate_u_, &rate_v_, &sum_u_, &sum_v_})
     field->allocate(shape.velocities);
   work_.allocate(shape);
-  if (plan_.bodies) pose_.allocate(shape.slots);
+  if (plan_->bodies) pose_.allocate(shape.slots);
   std::ranges::copy(model_->neutral(), q_.flat().begin());
 }
+
+Baseline::~Baseline() = default;
 
 void Baseline::set(std::span<const double> q, std::span<const double> v) {
   if (q.size() != q_.flat().size() || v.size() != v_.flat().size()) {
@@ -68,7 +72,7 @@ void Baseline::set(std::span<const double> q, std::span<const double> v) {
   std::ranges::copy(q, q_.flat().begin());
   std::ranges::copy(v, v_.flat().begin());
   normalise_positions(*model_, q_.flat());
-  spread_mimics<double>(ties_.mimics(), v_);
+  spread_mimics<double>(ties_->mimics(), v_);
 }
 
 void Baseline::place() {
@@ -82,12 +86,12 @@ void Baseline::place() {
   } else {
     std::ranges::fill(work_.force.flat(), 0.0);
   }
-  for (const JointSpring& spring : plan_.effects.springs) {
-    const double stretch = q_(plan_.q_row(spring.row)) - spring.rest;
+  for (const JointSpring& spring : plan_->effects.springs) {
+    const double stretch = q_(plan_->q_row(spring.row)) - spring.rest;
     work_.force(spring.row) -= spring.stiffness * stretch;
     potential_ += 0.5 * spring.stiffness * stretch * stretch;
   }
-  for (const BallSpring& spring : plan_.effects.ball_springs) {
+  for (const BallSpring& spring : plan_->effects.ball_springs) {
     const Index from = tree.first_q(spring.slot), row = tree.first_v(spring.slot);
     const Vec3<double> turn =
         shorter_turn(rest_inverse<double>(spring) * Quaternion<double>{load3<double>(q_, from), q_(from + 3)});
@@ -97,10 +101,10 @@ void Baseline::place() {
 }
 
 void Baseline::drive(double time, const Field<double>& v) {
-  const Effects& effects = plan_.effects;
+  const Effects& effects = plan_->effects;
   for (const JointDamping& damper : effects.damping) work_.force(damper.row) -= damper.coefficient * v(damper.row);
   for (const Servo& servo : effects.servos) {
-    work_.force(servo.row) += servo.stiffness * (servo.target_at(time) - q_(plan_.q_row(servo.row))) +
+    work_.force(servo.row) += servo.stiffness * (servo.target_at(time) - q_(plan_->q_row(servo.row))) +
                               servo.damping * (servo.target_velocity.at(time) - v(servo.row)) + servo.feedforward.at(time);
   }
   for (const JointTorque& torque : effects.torques) work_.force(torque.row) += torque.force.at(time);
@@ -113,7 +117,7 @@ void Baseline::push_bodies(double time) {
     const Wrench<double> wrench{moment + cross(point, force), force};
     store(work_.impulse, slot, load<Wrench, double>(work_.impulse, slot) - wrench);
   };
-  for (const BodyWrench& wrench : plan_.effects.wrenches) {
+  for (const BodyWrench& wrench : plan_->effects.wrenches) {
     const double share = wrench.share_at(time);
     Vec3<double> force = share * vector(wrench.force), moment = share * vector(wrench.moment);
     if (wrench.in_world) {
@@ -123,11 +127,11 @@ void Baseline::push_bodies(double time) {
     }
     push(wrench.slot, vector(wrench.point), force, moment);
   }
-  for (const Drag& drag : plan_.effects.drag) {
+  for (const Drag& drag : plan_->effects.drag) {
     const auto G = load<Inertia, double>(model_->constants.inertia, drag.slot);
     const Vec3<double> c = G.m > 0 ? (1 / G.m) * G.mc : Vec3<double>{0, 0, 0};
     const auto V = load<Twist, double>(work_.twist, drag.slot);
-    const Vec3<double> air = transpose_times(load<Placement, double>(pose_, drag.slot).R, vector(plan_.effects.wind));
+    const Vec3<double> air = transpose_times(load<Placement, double>(pose_, drag.slot).R, vector(plan_->effects.wind));
     const Vec3<double> through = V.v + cross(V.w, c) - air;
     const double b = drag.linear + drag.quadratic * std::sqrt(dot(through, through));
     push(drag.slot, c, -b * through, {0, 0, 0});
@@ -142,16 +146,16 @@ void Baseline::accelerate(double time, const Field<double>& v, Field<double>& a)
   drive(time, v);
   velocity_down(tree, constants, work_.placement, v, work_.twist);
   coriolis_down(tree, constants, work_.placement, v, work_.twist, work_.bias, work_.impulse);
-  if (plan_.bodies) push_bodies(time);
+  if (plan_->bodies) push_bodies(time);
   impulse_up(tree, constants, work_.placement, work_.impulse, work_.residual);
   for (Index row = 0; row < v.rows(); ++row) work_.residual(row) = work_.force(row) - work_.residual(row);
-  fold_mimics(ties_.mimics(), work_.residual);
+  fold_mimics(ties_->mimics(), work_.residual);
 
   const Gains<double> gains{work_.gain_up, work_.gain_down, work_.joint_inverse};
   const auto factor = [&](const auto& added) { articulated_inertia_up(tree, constants, work_.placement, work_.articulated, gains, added); };
-  const auto tied = [&](const auto& added) { ties_.empty() ? factor(added) : factor(ties_.held(added)); };
-  if (plan_.rotor.rows() > 0) {
-    tied(EffectsAdded<double, true, false>{plan_.rotor, none_});
+  const auto tied = [&](const auto& added) { ties_->empty() ? factor(added) : factor(ties_->held(added)); };
+  if (plan_->rotor.rows() > 0) {
+    tied(EffectsAdded<double, true, false>{plan_->rotor, none_});
   } else {
     tied(NothingAdded{});
   }
@@ -160,9 +164,9 @@ void Baseline::accelerate(double time, const Field<double>& v, Field<double>& a)
     rate_down(tree, constants, work_.placement, gains, work_.innovation, work_.variation, x);
   };
   const auto load = [&](Index i) { return tied_load(tree, constants, gains, work_.bias, work_.variation, i); };
-  if (!ties_.empty()) ties_.factor(solve, load, work_.increment);
+  if (!ties_->empty()) ties_->factor(solve, load, work_.increment);
   solve(work_.residual, a);
-  if (!ties_.empty()) ties_.complete(a);
+  if (!ties_->empty()) ties_->complete(a);
 }
 
 void Baseline::move(const Field<double>& from, const Field<double>& u) {
@@ -170,7 +174,7 @@ void Baseline::move(const Field<double>& from, const Field<double>& u) {
   std::ranges::copy(from.flat(), q_.flat().begin());
   motion_map(tree, model_->constants, u, work_.motion);
   advance_map(tree, work_.motion, u, q_);
-  for (const Mimic& mimic : ties_.mimics()) q_(mimic.follower_q) = mimic.multiplier * q_(mimic.leader_q) + mimic.offset;
+  for (const Mimic& mimic : ties_->mimics()) q_(mimic.follower_q) = mimic.multiplier * q_(mimic.leader_q) + mimic.offset;
 }
 
 /// u' of exp(u)' = exp(u) v, up to the terms that fourth order needs; a screw's coordinates are its own.
@@ -241,7 +245,7 @@ void Baseline::find_momentum(const Field<double>& v) {
   velocity_down(tree, model_->constants, work_.placement, v, work_.twist);
   momentum_of_map(tree, model_->constants, work_.twist, work_.impulse);
   impulse_up(tree, model_->constants, work_.placement, work_.impulse, work_.residual);
-  add_armature<double>(plan_.effects.armature, v, work_.residual);
+  add_armature<double>(plan_->effects.armature, v, work_.residual);
 }
 
 Energy Baseline::energy() {

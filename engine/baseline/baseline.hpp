@@ -20,13 +20,17 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/effects/effect_plan.hpp"
+#include "engine/energy.hpp"
 #include "engine/options.hpp"
-#include "engine/simulation.hpp"
-#include "kernels/tree/mimic.hpp"
+#include "layout/effects.hpp"
+#include "layout/model.hpp"
 #include "layout/workspace.hpp"
 
 namespace linden {
+
+struct EffectPlan;
+template <class S>
+class MimicTies;
 
 enum class Scheme { semi_implicit_euler, rk4 };
 
@@ -37,6 +41,7 @@ class Baseline {
   /// At rest in the model's zero configuration. Of the options it takes step and gravity. Throws InputError for an effect that
   /// it has not.
   Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Options& options, const Effects& effects = {});
+  ~Baseline();
 
   const Model& model() const { return *model_; }
   double time() const { return static_cast<double>(steps_) * options_.step; }
@@ -74,7 +79,7 @@ class Baseline {
   Scheme scheme_;
   Options options_;
   bool gravity_;
-  EffectPlan plan_;
+  std::unique_ptr<const EffectPlan> plan_;
   double potential_ = 0;
   std::int64_t steps_ = 0, evaluations_ = 0;
   Field<double> q_, v_, good_q_, good_v_;
@@ -82,7 +87,7 @@ class Baseline {
   Field<double, 36> none_;  // no pull on any body
   Field<double, 12> pose_;  // of bodies in the world, where something acts on them
   Workspace<double> work_;
-  MimicTies<double> ties_;
+  std::unique_ptr<MimicTies<double>> ties_;
 };
 
 }  // namespace linden

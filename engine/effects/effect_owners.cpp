@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "engine/effects/effect_plan.hpp"
+
 namespace linden {
 namespace {
 

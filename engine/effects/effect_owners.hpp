@@ -5,9 +5,12 @@
 #include <string>
 #include <string_view>
 
-#include "engine/effects/effect_plan.hpp"
+#include "layout/names.hpp"
+
 
 namespace linden {
+
+struct EffectPlan;
 
 /// A line a kind that there is: its name, then joints or bodies in the order of its list, each after a null character.
 std::string effect_owners(const EffectPlan& plan, const Names& names);

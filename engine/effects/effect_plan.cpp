@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "engine/effects/stiff_contact.hpp"
 #include "kernels/effects/joint_impulses.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/increment_down.hpp"

@@ -5,9 +5,7 @@
 // An effect that the scene does not name has no entry here, no memory in the sweeps and no call in a step.
 #pragma once
 
-#include <optional>
 #include <span>
-#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -30,15 +28,6 @@ struct TouchedBody {
   Index slot = 0;
   Entries drag, wrenches, points;
 };
-
-/// A body that bounces less than its ground is elastic, as the step does not resolve the ground's stiffness under it.
-struct StiffContact {
-  std::string link;
-  double mass;  // that the stiffness was compared with [kg]
-};
-
-/// The lightest such body, where the ground's damping does not take as much anyway.
-std::optional<StiffContact> stiffest_unresolved(const Model& model, const Options& options, const Effects& effects);
 
 struct EffectPlan {
   /// Throws InputError for effects that make no sense for the model.

@@ -59,7 +59,7 @@ class BaselineMover final : public Mover {
 
 class SingleMover final : public Mover {
  public:
-  SingleMover(const AccuracySetup& setup, const Options& options) : batch_(setup.model, 1, batch_options(options), setup.effects) {
+  SingleMover(const AccuracySetup& setup, const Options& options) : batch_(setup.model, 1, stepping(options), setup.effects, {.threads = 1}) {
     ComposedMover start(setup, options);
     std::vector<double> v = setup.start.velocities;
     if (v.empty()) v.resize(static_cast<std::size_t>(setup.model->tree.shape.velocities));
@@ -76,21 +76,15 @@ class SingleMover final : public Mover {
   }
   std::optional<Momentum> momentum() override { return std::nullopt; }
   std::span<const double> positions() override {
-    Eigen::Map<Eigen::VectorXd>(positions_.data(), static_cast<Eigen::Index>(positions_.size())) =
-        batch_.positions().instance(0).cast<double>();
+    const auto found = batch_.positions();
+    for (std::size_t row = 0; row < positions_.size(); ++row) positions_[row] = static_cast<double>(found(0, static_cast<Index>(row)));
     return positions_;
   }
   std::int64_t evaluations() const override { return batch_.summary().evaluations; }
   std::string failure() const override { return batch_.describe(0); }
 
  private:
-  static BatchOptions batch_options(const Options& options) {
-    BatchOptions result;
-    result.step = options.step;
-    result.gravity = options.gravity;
-    result.threads = 1;
-    return result;
-  }
+  static Options stepping(const Options& options) { return {.step = options.step, .gravity = options.gravity}; }
   FloatBatch batch_;
   std::vector<double> positions_;
 };

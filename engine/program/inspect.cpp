@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "engine/effects/effect_plan.hpp"
 #include "engine/files/output_file.hpp"
 #include "engine/files/report_files.hpp"
 #include "engine/mass_distribution.hpp"
@@ -72,16 +73,15 @@ struct BodyFacts {
 /// no link: their own frame serves.
 std::array<double, 3> axis_of(const Model& model, Index slot) {
   const auto& X = model.constants.tree_placement;
-  Eigen::Vector3d axis(X(slot, 2), X(slot, 5), X(slot, 8));
+  std::array<double, 3> axis{X(slot, 2), X(slot, 5), X(slot, 8)};
   const Index parent = model.tree.parent(slot);
   const auto link = model.names.link.find(model.names.body[static_cast<std::size_t>(parent)]);
-  if (parent != 0 && link != model.names.link.end()) axis = link->second.in_body.linear().transpose() * axis;
+  if (parent != 0 && link != model.names.link.end()) axis = turned_back(link->second.in_body, axis);
   constexpr double kRounding = 1e-12;
-  std::array<double, 3> result{axis.x(), axis.y(), axis.z()};
-  for (double& part : result) {
+  for (double& part : axis) {
     if (std::abs(part - std::round(part)) < kRounding) part = std::round(part) + 0.0;
   }
-  return result;
+  return axis;
 }
 
 bool is_massless(const Model& model, Index slot) {
@@ -206,7 +206,7 @@ class Printer {
     row("freedom", fmt::format("{} of freedom; {} in q, {} in v{}", counted(model_.degrees_of_freedom(), "degree"),
                                counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics));
     row("mass", fmt::format("{:.6g} kg; centre of mass ({:.6g}, {:.6g}, {:.6g}) m in the zero configuration", masses.mass,
-                            masses.center.x(), masses.center.y(), masses.center.z()));
+                            masses.center[0], masses.center[1], masses.center[2]));
     if (model_.welded.mass() > 0) row("", fmt::format("{:.6g} kg of links fixed to the world beside it, which move nothing", model_.welded.mass()));
     row("tree", fmt::format("{}, up to {} wide; {} of one joint kind", counted(tree.levels() - 1, "level"),
                             counted(widest_level(tree), "body"), counted(static_cast<std::int64_t>(tree.runs.size()), "run")));
@@ -353,7 +353,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
               {"velocities", tree.shape.velocities},
               {"mass", masses.mass},
               {"welded_mass", model.welded.mass()},
-              {"center_of_mass", {masses.center.x(), masses.center.y(), masses.center.z()}},
+              {"center_of_mass", {masses.center[0], masses.center[1], masses.center[2]}},
               {"levels", tree.levels() - 1},
               {"widest_level", widest_level(tree)},
               {"joints", counts_of(bodies)},

@@ -142,9 +142,9 @@ void read_rollout_options(const OptionTexts& texts, RolloutArguments& rollout) {
   read_order(texts, rollout.options);
   if (!texts.threads.empty()) {
     const std::int64_t threads = integer_from("--threads", texts.threads, "how many, such as 8; 0 for all there are");
-    rollout.options.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
+    rollout.computed.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
   }
-  if (!texts.instructions.empty()) rollout.options.instructions = instructions_from(texts.instructions);
+  if (!texts.instructions.empty()) rollout.computed.instructions = instructions_from(texts.instructions);
 }
 
 void read_scaling_options(const OptionTexts& texts, ScalingArguments& scaling) {

@@ -61,22 +61,16 @@ class Execution {
       : arguments_(arguments),
         model_(std::move(model)),
         effects_(arguments.effects()),
-        batch_(model_, arguments.instances, arguments.options, effects_) {
+        batch_(scene_of(arguments, *model_), arguments.instances, arguments.computed) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
     figures_.threads = batch_.threads();
     DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, *model_, effects_, arguments.instances);
-    const auto randomize = [&](std::int64_t i) {
-      const DrawnNumbers numbers = drawn_of(i);
-      apply(numbers, effects_, batch_, i);
-      drawn.set(i, numbers);
-    };
-    if (arguments.randomization.any()) randomize(0);  // makes room, before there are several threads
     batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
       const InitialState state = start_of(i);
       std::ranges::copy(state.positions, positions.begin());
       std::ranges::copy(state.velocities, velocities.begin());
-      if (arguments.randomization.any()) randomize(i);
+      if (!drawn.arrays().empty()) drawn.set(i, drawn_of(i));
     });
     look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
       const auto rows = batch_.positions().instance(i);
@@ -144,6 +138,17 @@ class Execution {
   RolloutFigures& figures() { return figures_; }
 
  private:
+  /// What is drawn and how to step are the command line's; the start was looked at (look_at_start).
+  static Scene scene_of(const RolloutArguments& arguments, const Model& model) {
+    Scene scene;
+    if (arguments.scene) scene = *arguments.scene;
+    else scene.model = model;
+    scene.options = arguments.options;
+    scene.randomization = arguments.randomization;
+    scene.seed = randomness(arguments)->seed;
+    scene.start_as_given = true;
+    return scene;
+  }
   std::uint64_t seed_of(std::int64_t i) const { return randomness(arguments_)->seed + static_cast<std::uint64_t>(i); }
   InitialState start_of(std::int64_t i) const {
     const double spread = randomness(arguments_)->spread;

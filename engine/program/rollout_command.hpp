@@ -19,7 +19,8 @@
 namespace linden {
 
 struct RolloutArguments : MotionArguments {
-  BatchOptions options;
+  Options options;
+  BatchOptions computed;  // with which threads and instructions
   std::int64_t instances = 1024;
   bool single = false;      // float instead of double
   std::int64_t every = 1;   // steps between recorded frames

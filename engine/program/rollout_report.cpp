@@ -49,7 +49,7 @@ double evaluations_mean(const RolloutFigures& figures) {
 }  // namespace
 
 std::string rollout_summary(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures) {
-  const BatchOptions& options = arguments.options;
+  const Options& options = arguments.options;
   std::string text;
   const auto row = [&](const char* label, const std::string& value) { text += fmt::format("{:<11} {}\n", label, value); };
   const auto random = randomness(arguments);
@@ -71,7 +71,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                             arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance,
                             gravity_text(options)));
   row("processor", fmt::format("{} of {} instances ({})", counted(figures.threads, "thread"), figures.lanes,
-                               model.mimics.empty() ? std::string(name(options.instructions.value_or(best_instructions())))
+                               model.mimics.empty() ? std::string(name(arguments.computed.instructions.value_or(best_instructions())))
                                                     : "mimic joints: stepped one by one"));
   if (figures.summary.steps > 0) {
     const double simulated = static_cast<double>(figures.steps) * options.step;
@@ -113,7 +113,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
 
 nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures) {
   using Json = nlohmann::ordered_json;
-  const BatchOptions& options = arguments.options;
+  const Options& options = arguments.options;
   const auto random = randomness(arguments);
   const EnergyChange energy(figures);
   const bool ran = figures.summary.steps > 0;
@@ -129,7 +129,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"instances", arguments.instances},
       {"threads", figures.threads},
       {"lanes", figures.lanes},
-      {"instructions", name(options.instructions.value_or(best_instructions()))},
+      {"instructions", name(arguments.computed.instructions.value_or(best_instructions()))},
       {"precision", arguments.single ? "single" : "double"},
       {"bytes", figures.bytes},
       {"tolerance", arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance},

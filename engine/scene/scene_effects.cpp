@@ -15,6 +15,7 @@
 #include "engine/text.hpp"
 #include "layout/smooth_curve.hpp"
 #include "layout/support/words.hpp"
+#include "models/build/isometry.hpp"
 #include "models/shapes/contacts_of.hpp"
 
 namespace linden {
@@ -285,11 +286,12 @@ class Reader {
       at.fail(at.path() + " has neither force nor moment", "one of them or both", "add force: [x, y, z]");
     BodyWrench result{.slot = place.slot};
     const Vector3d force = vector_at("force", "[x, y, z] in N"), moment = vector_at("moment", "[x, y, z] in N m");
-    const Vector3d point = place.in_body * vector_at("point", "[x, y, z] in m");
+    const Isometry in_body = isometry(place.in_body);
+    const Vector3d point = in_body * vector_at("point", "[x, y, z] in m");
     result.point = array_of(point);
     if (const auto frame = at.find("frame")) result.in_world = frame->choice(kFrames) == "world";
-    result.force = array_of(result.in_world ? force : Vector3d(place.in_body.linear() * force));
-    result.moment = array_of(result.in_world ? moment : Vector3d(place.in_body.linear() * moment));
+    result.force = array_of(result.in_world ? force : Vector3d(in_body.linear() * force));
+    result.moment = array_of(result.in_world ? moment : Vector3d(in_body.linear() * moment));
     if (const auto value = at.find("from")) result.from = value->number();
     if (const auto value = at.find("to")) result.to = value->number();
     if (result.from > result.to)

@@ -9,9 +9,10 @@
 #include <unordered_set>
 #include <utility>
 
-#include "engine/effects/effect_plan.hpp"
+#include "engine/effects/stiff_contact.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_effects.hpp"
+#include "engine/scene/scene_start.hpp"
 #include "engine/scene/scene_yaml.hpp"
 #include "engine/start_check.hpp"
 #include "layout/smooth_curve.hpp"
@@ -195,7 +196,8 @@ class SceneReader {
       if (!model)
         item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3",
                   "add it");
-      entrants.push_back({item, {load(*model, item.find("base"), item.find("inertia")), "", Pose::Identity()}, read_base(item)});
+      PlacedModel placed{load(*model, item.find("base"), item.find("inertia")), ""};
+      entrants.push_back({item, std::move(placed), read_base(item)});
       const auto name = item.find("name");
       if (name) entrants.back().placed.name = name->text("a name");
       if (const auto parent = item.find("parent")) entrants.back().placed.parent = parent->text("a link of another model, such as crane/hook");

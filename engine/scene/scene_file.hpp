@@ -29,12 +29,20 @@
 // with file, line and advice.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "engine/scene/scene.hpp"
-#include "engine/scene/scene_start.hpp"
 
 namespace linden {
+
+/// What a command line may say instead of the scene.
+struct SceneStart {
+  std::optional<std::uint64_t> seed;
+  std::optional<double> spread;
+  std::optional<double> density{};  // of links without inertia [kg/m^3], of all models that are URDF files
+};
 
 /// Whether the name is that of a scene: it ends in .yaml or .yml.
 bool is_scene(const std::string& file);

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/scene/scene_file.hpp"
 #include "layout/effects.hpp"
 #include "layout/support/words.hpp"
+#include "models/build/isometry.hpp"
 
 namespace linden {
 namespace {
@@ -16,14 +18,12 @@ using Eigen::Vector3d;
 const std::vector<std::string> kKeys{"base", "positions", "velocities", "seed", "spread"};
 const std::vector<std::string> kBaseKeys{"position", "rotation", "quaternion", "velocity", "angular_velocity"};
 
-Vector3d vector_of(const SceneValue& at, const char* expected) {
-  const std::array<double, 3> v = at.vector(expected);
-  return {v[0], v[1], v[2]};
-}
+Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+Eigen::Matrix3d matrix_of(const std::array<double, 4>& q) { return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix(); }
 
 /// Body frame at q = 0 in the world, of a root.
-Pose placement_of(const Model& model, Index slot) {
-  Pose pose = Pose::Identity();
+Isometry placement_of(const Model& model, Index slot) {
+  Isometry pose = Isometry::Identity();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
@@ -39,17 +39,17 @@ class Start {
 
   /// Moves a free root by the pose that its model is given.
   void place(const PlacedBase& base) {
-    const Pose placement = placement_of(model_, base.slot);
-    put_pose(base.slot, placement.inverse() * base.start.pose() * placement * pose_of(base.slot));
+    const Isometry placement = placement_of(model_, base.slot);
+    put_pose(base.slot, placement.inverse() * isometry(base.start.pose()) * placement * pose_in(base.slot));
     put_velocity(base.slot, base.start);
   }
 
   /// Puts a free root where the scene says, in the world's frame; what it does not say stays.
   void put_base(Index slot, const BaseStart& start) {
-    const Pose placement = placement_of(model_, slot);
-    Pose world = placement * pose_of(slot);
-    if (start.position) world.translation() = *start.position;
-    if (start.rotation) world.linear() = start.rotation->toRotationMatrix();
+    const Isometry placement = placement_of(model_, slot);
+    Isometry world = placement * pose_in(slot);
+    if (start.position) world.translation() = vector_of(*start.position);
+    if (start.rotation) world.linear() = matrix_of(*start.rotation);
     put_pose(slot, placement.inverse() * world);
     put_velocity(slot, start);
   }
@@ -106,15 +106,15 @@ class Start {
     std::ranges::copy(values, velocity ? &v(first) : &q(first));
   }
 
-  Pose pose_of(Index slot) {
+  Isometry pose_in(Index slot) {
     const Index row = model_.tree.first_q(slot);
-    Pose pose = Pose::Identity();
+    Isometry pose = Isometry::Identity();
     pose.translation() = Vector3d(q(row), q(row + 1), q(row + 2));
     pose.linear() = Eigen::Quaterniond(q(row + 6), q(row + 3), q(row + 4), q(row + 5)).toRotationMatrix();
     return pose;
   }
 
-  void put_pose(Index slot, const Pose& pose) {
+  void put_pose(Index slot, const Isometry& pose) {
     Eigen::Quaterniond turn(Eigen::Matrix3d(pose.linear()));
     turn.normalize();
     const Vector3d p = pose.translation();
@@ -123,10 +123,10 @@ class Start {
 
   /// From the world's frame to the body's.
   void put_velocity(Index slot, const BaseStart& start) {
-    const Pose world = placement_of(model_, slot) * pose_of(slot);
+    const Isometry world = placement_of(model_, slot) * pose_in(slot);
     const Index row = model_.tree.first_v(slot);
-    const auto turned = [&](const Vector3d& u) {
-      const Vector3d b = world.linear().transpose() * u;
+    const auto turned = [&](const std::array<double, 3>& u) {
+      const Vector3d b = world.linear().transpose() * vector_of(u);
       return std::vector<double>{b.x(), b.y(), b.z()};
     };
     if (start.angular_velocity) put(true, row, turned(*start.angular_velocity));
@@ -140,29 +140,26 @@ class Start {
 }  // namespace
 
 Pose BaseStart::pose() const {
-  Pose pose = Pose::Identity();
-  if (rotation) pose.linear() = rotation->toRotationMatrix();
-  if (position) pose.translation() = *position;
-  return pose;
+  Isometry pose = Isometry::Identity();
+  if (rotation) pose.linear() = matrix_of(*rotation);
+  if (position) pose.translation() = vector_of(*position);
+  return pose_of(pose);
 }
 
 BaseStart read_base(const SceneValue& at) {
-  using Turn = Eigen::Quaternion<double, Eigen::DontAlign>;
   BaseStart start;
-  if (const auto position = at.find("position")) start.position = vector_of(*position, "[x, y, z] in m");
+  if (const auto position = at.find("position")) start.position = position->vector("[x, y, z] in m");
   const auto rotation = at.find("rotation"), quaternion = at.find("quaternion");
   if (rotation && quaternion) quaternion->fail("rotation and quaternion are both given", "one of them", "leave one out");
   if (rotation) {
-    const Vector3d angles = vector_of(*rotation, "[roll, pitch, yaw] in rad");
-    start.rotation = Turn(Eigen::AngleAxisd(angles.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(angles.y(), Vector3d::UnitY()) *
-                          Eigen::AngleAxisd(angles.x(), Vector3d::UnitX()));
+    const std::array<double, 3> angles = rotation->vector("[roll, pitch, yaw] in rad");
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(angles[2], Vector3d::UnitZ()) * Eigen::AngleAxisd(angles[1], Vector3d::UnitY()) *
+                                  Eigen::AngleAxisd(angles[0], Vector3d::UnitX()));
+    start.rotation = {turn.x(), turn.y(), turn.z(), turn.w()};
   }
-  if (quaternion) {
-    const std::array<double, 4> q = quaternion->quaternion();
-    start.rotation = Turn(q[3], q[0], q[1], q[2]);
-  }
-  if (const auto velocity = at.find("velocity")) start.velocity = vector_of(*velocity, "[x, y, z] in m/s");
-  if (const auto velocity = at.find("angular_velocity")) start.angular_velocity = vector_of(*velocity, "[x, y, z] in rad/s");
+  if (quaternion) start.rotation = quaternion->quaternion();
+  if (const auto velocity = at.find("velocity")) start.velocity = velocity->vector("[x, y, z] in m/s");
+  if (const auto velocity = at.find("angular_velocity")) start.angular_velocity = velocity->vector("[x, y, z] in rad/s");
   return start;
 }
 

@@ -8,7 +8,7 @@
 //   seed, spread  start from random positions and speeds (engine/initial_state.hpp); what is named above goes over them
 #pragma once
 
-#include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -18,18 +18,13 @@
 
 namespace linden {
 
-/// What a command line may say instead of the scene.
-struct SceneStart {
-  std::optional<std::uint64_t> seed;
-  std::optional<double> spread;
-  std::optional<double> density{};  // of links without inertia [kg/m^3], of all models that are URDF files
-};
+struct SceneStart;
 
 /// Pose and velocity of a base in the world, as far as they are given.
 struct BaseStart {
-  std::optional<Eigen::Vector3d> position;
-  std::optional<Eigen::Quaternion<double, Eigen::DontAlign>> rotation;
-  std::optional<Eigen::Vector3d> velocity, angular_velocity;
+  std::optional<std::array<double, 3>> position;  // [m]
+  std::optional<std::array<double, 4>> rotation;  // quaternion x y z w
+  std::optional<std::array<double, 3>> velocity, angular_velocity;  // [m/s, rad/s]
 
   Pose pose() const;
 };

@@ -5,45 +5,15 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <string_view>
 
-#include "engine/effects/effect_plan.hpp"
+#include "engine/instance_record.hpp"
 #include "engine/options.hpp"
-#include "engine/step_report.hpp"
+#include "engine/solve/instructions.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
 
-/// Lanes of double precision; of single precision twice as many, but for one.
-enum class Instructions : std::uint8_t {
-  scalar,    // 1: no vector instructions
-  baseline,  // 2: SSE2, NEON
-  avx2,      // 4: AVX2 and FMA
-  avx512,    // 8
-};
-
-/// The best that this processor has and linden was compiled for.
-Instructions best_instructions();
-bool available(Instructions instructions);
-std::string_view name(Instructions instructions);
-/// Throws InputError naming the choices where `text` is none of them.
-Instructions instructions_from(const std::string& text);
-/// Instances of a block.
-template <class Real>
-int lanes_of(Instructions instructions);
-
-/// How an instance is doing, and what its steps cost.
-struct InstanceRecord {
-  StepStatus status = StepStatus::converged;  // of the last step; an instance that fails is frozen at its last good state
-  std::int8_t displacements = 0;              // how many earlier displacements the first guess may use
-  Index slot = 0;                             // where a frozen instance failed: body or joint; 0 = fine
-  std::int32_t rescued = 0;                   // steps taken alone: backtracked or split, as a Simulation would
-  std::int64_t steps = 0;                     // since the start or the last reset
-  std::int64_t evaluations = 0;               // of the residual, likewise
-  double residual = 0;                        // relative, of a frozen instance's failed step
-  bool operator==(const InstanceRecord&) const = default;
-};
+struct EffectPlan;
 
 /// Where the W instances of a block lie. Rows are [row][lane].
 template <class Real>
@@ -92,8 +62,5 @@ template <Instructions, bool kEffects>
 std::unique_ptr<BlockStepper<double>> make_block_stepper(const BlockSetup<double>& setup);
 template <Instructions, bool kEffects>
 std::unique_ptr<BlockStepper<float>> make_block_stepper(const BlockSetup<float>& setup);
-
-/// Of single precision nothing better can be asked: rounding leaves about so much of the residual.
-inline constexpr double kSingleTolerance = 3e-6;
 
 }  // namespace linden

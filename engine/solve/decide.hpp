@@ -6,7 +6,8 @@
 //   seen, the first line that holds                       next             alone                              in a block
 //   a body turned too far, or something is not finite     cut              up to 10 times, then take back     give up
 //   - of the first guess                                  give up
-//   states of effects do not settle                       continuation     after 5 and 20 updates             -
+//   states of effects were updated too often              give up          60 times                           24
+//   they do not settle                                    continuation     after 5 and 20 updates             -
 //   a state of an effect changed                          update states    one at a time from the 5th on      from the 8th on
 //   the residual did not fall, is not solved              cut              up to 10 times, then take back     give up from the 2nd on; never with effects
 //   the correction was taken back                         refactor         give up if the factor was fresh    -
@@ -43,7 +44,7 @@ struct Policy {
   int one_state_at_a_time = kAnyNumber;  // from so many updates on: of what sticks too hard that alone which does most
   int one_limit_at_a_time = kAnyNumber;  // likewise of limits
   int first_continuation = kAnyNumber, last_continuation = kAnyNumber;  // after so many updates
-  int most_updates = kAnyNumber;  // of states; what has not settled by then is not accepted
+  int most_updates = kAnyNumber;  // of states; what has not settled by then is given up
 };
 
 /// One instance after an evaluation of its residual.
@@ -65,15 +66,16 @@ constexpr Next decide(const Policy& policy, const Seen& seen) {
   const bool can_cut = seen.corrected && policy.most_cuts > 0;
   const Next shorter = seen.cuts < policy.most_cuts ? Next::cut : Next::take_back;
   if (!seen.usable) return can_cut ? shorter : Next::give_up;
+  if (seen.updates >= policy.most_updates) return Next::give_up;
   if (seen.updates == policy.first_continuation || seen.updates == policy.last_continuation) return Next::continuation;
-  if (seen.changed && seen.updates < policy.most_updates) return Next::update_states;
+  if (seen.changed) return Next::update_states;
   if (seen.corrected && !seen.fell && !seen.solved) {
     if (policy.most_cuts > 0) return shorter;
     if (seen.corrections > policy.may_grow) return Next::give_up;
   }
   if (seen.taken_back && !seen.solved) return seen.fresh || !policy.refactors ? Next::give_up : Next::refactor;
   if ((seen.slow || seen.stale) && seen.corrected && !seen.at_floor && policy.refactors) return Next::refactor;
-  if (seen.solved) return seen.updates < policy.most_updates ? Next::accept : Next::give_up;
+  if (seen.solved) return Next::accept;
   return seen.corrections >= policy.most_corrections ? Next::give_up : Next::correct;
 }
 

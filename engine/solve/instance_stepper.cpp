@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/effects/effect_plan.hpp"
 #include "kernels/tree/mimic.hpp"
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "engine/solve/stepper.hpp"
+#include "layout/body_constants.hpp"
 
 namespace linden {
 

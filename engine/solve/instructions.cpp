@@ -1,7 +1,7 @@
 // Which vector instructions this processor has.
 #include <fmt/format.h>
 
-#include "engine/solve/block_stepper.hpp"
+#include "engine/solve/instructions.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {

@@ -118,8 +118,8 @@ class Solve {
     Lanes late = 0, last = 0;
     for (int l = 0; l < W; ++l) {
       const int updates = updates_[at(l)];
-      const bool whole_tree = updates == policy_.first_continuation || updates == policy_.last_continuation;
-      if (whole_tree || updates >= policy_.most_updates) lanes &= ~(1u << l);
+      const bool is_continued = updates == policy_.first_continuation || updates == policy_.last_continuation;
+      if (is_continued) lanes &= ~(1u << l);
       if (updates >= policy_.one_state_at_a_time) late |= 1u << l;
       if (updates >= policy_.one_limit_at_a_time) last |= 1u << l;
     }

@@ -12,23 +12,21 @@
 #include <vector>
 
 #include "engine/effects/effect_controls.hpp"
-#include "engine/effects/effect_plan.hpp"
 #include "engine/effects/effect_work.hpp"
 #include "engine/effects/step_impulses.hpp"
+#include "engine/energy.hpp"
 #include "engine/options.hpp"
 #include "engine/step_report.hpp"
-#include "kernels/values/spatial.hpp"
 #include "layout/state.hpp"
 
 namespace linden {
 
-struct Energy {
-  double kinetic = 0;    // 1/2 p.M^-1 p [J]
-  double potential = 0;  // of gravity (zero where the centre of mass is at the height of the world's origin), springs and ground [J]
-  double springs = 0, ground = 0;  // their shares of it
-  double total() const { return kinetic + potential; }
-  double gravity() const { return potential - springs - ground; }
-};
+struct EffectPlan;
+struct Model;
+template <class Scalar>
+struct BodyConstants;
+template <class Scalar>
+struct Wrench;  // kernels/values/spatial.hpp
 
 /// What follows a step: nothing that is known of, or a step of the same h before anything else is asked of stepper and state, which may then
 /// be left for that step to complete.

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "engine/effects/effect_plan.hpp"
 #include "engine/guess/first_guess.hpp"
 #include "engine/solve/stepper.hpp"
 #include "engine/sweeps/tree_sweeps.hpp"

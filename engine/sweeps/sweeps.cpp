@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/effects/effect_plan.hpp"
 #include "engine/sweeps/strategy.hpp"
 
 namespace linden {

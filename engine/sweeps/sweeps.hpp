@@ -6,11 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/effects/effect_plan.hpp"
 #include "engine/options.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
+
+struct EffectPlan;
 
 struct Sweep {
   std::string_view when;

@@ -265,7 +265,7 @@ class Build {
     model_.welded.inertia = welded_.numbers();
     sum_subtree_masses(tree, constants);
     for (std::size_t link = 0; link < links_.size(); ++link) {
-      names.link[links_[link].name] = {slot_of(carrier_[link].body), carrier_[link].pose};
+      names.link[links_[link].name] = {slot_of(carrier_[link].body), pose_of(carrier_[link].pose)};
       if (links_[link].type != JointType::fixed) names.slot_of_joint[links_[link].joint] = slot_of(carrier_[link].body);
     }
   }
@@ -274,12 +274,12 @@ class Build {
     for (std::size_t link = 0; link < links_.size(); ++link) {
       const Index slot = slot_of(carrier_[link].body);
       for (const LinkShape& shape : links_[link].shapes) {
-        const Pose pose(carrier_[link].pose * shape.pose);
+        const Isometry3d pose(carrier_[link].pose * isometry(shape.pose));
         if (!pose.matrix().allFinite()) {
           fail(fmt::format("link {}: a collision shape lies too far away for numbers; expected metres; check its origin",
                            quoted(links_[link].name)));
         }
-        (slot == 0 ? model_.welded.shapes : model_.shapes).push_back({slot, links_[link].name, pose, shape.shape});
+        (slot == 0 ? model_.welded.shapes : model_.shapes).push_back({slot, links_[link].name, pose_of(pose), shape.shape});
       }
     }
     std::stable_sort(model_.shapes.begin(), model_.shapes.end(),
@@ -491,7 +491,7 @@ LinkInertia sphere_inertia(double mass, double radius, const Vector3d& center) {
 }
 
 LinkShape box_shape(const Vector3d& size, const Vector3d& center) {
-  return {Pose(Eigen::Translation3d(center)), {ShapeKind::box, {size.x(), size.y(), size.z()}, ""}};
+  return {{.shift = {center.x(), center.y(), center.z()}}, {ShapeKind::box, {size.x(), size.y(), size.z()}, ""}};
 }
 
 TreeBuilder& TreeBuilder::source(std::string source) {

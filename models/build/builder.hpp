@@ -15,7 +15,7 @@
 // Source of the inertia arithmetic: Featherstone, Rigid Body Dynamics Algorithms, 2.13 (spatial inertia, change of frame).
 #pragma once
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -24,6 +24,7 @@
 #include "layout/model.hpp"
 #include "layout/shapes.hpp"
 #include "layout/support/input_error.hpp"
+#include "models/build/isometry.hpp"
 
 namespace linden {
 
@@ -55,7 +56,7 @@ struct LinkSpec {
   std::string parent;  // name of the parent link; empty = the world
   std::string joint;
   JointType type = JointType::revolute;
-  Pose placement = Pose::Identity();  // joint frame (= link frame at zero) in the parent link's frame
+  Isometry placement = Isometry::Identity();  // joint frame (= link frame at zero) in the parent link's frame
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  // in the joint frame; normal of the plane for planar joints
   double pitch = 0;  // [m/rad], helical only
   LinkInertia inertia;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "layout/support/words.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/random.hpp"
 
 namespace linden {

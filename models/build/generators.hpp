@@ -5,7 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "models/build/builder.hpp"
+#include "layout/model.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 

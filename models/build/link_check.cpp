@@ -81,7 +81,7 @@ void check_shapes(const LinkSpec& link, const std::string& source) {
   for (const LinkShape& shape : link.shapes) {
     const bool mirrors = shape.shape.kind == ShapeKind::mesh;
     for (const double size : shape.shape.size) {
-      if (!std::isfinite(size) || (size < 0 && !mirrors) || !shape.pose.matrix().allFinite()) {
+      if (!std::isfinite(size) || (size < 0 && !mirrors) || !isometry(shape.pose).matrix().allFinite()) {
         fail(source, fmt::format("link {}: a collision shape has a negative size, or a size or pose that is not finite",
                          quoted(link.name)));
       }

@@ -28,7 +28,7 @@ class Merger {
   Model run() {
     if (parts_.empty()) throw InputError("no models to merge; expected one or more; add a model");
     for (const PlacedModel& part : parts_) {
-      if (part.pose.matrix().allFinite()) continue;
+      if (isometry(part.pose).matrix().allFinite()) continue;
       throw InputError(fmt::format("the pose of model {} is not finite; expected numbers; check its position and rotation", quoted(part.name)));
     }
     hang();
@@ -54,18 +54,18 @@ class Merger {
   struct Ground {
     std::size_t part = 0;
     Index slot = 0;
-    Pose pose = Pose::Identity();
+    Isometry pose = Isometry::Identity();
   };
 
   void hang() {
     std::unordered_map<std::string, Ground> link_of;
     for (std::size_t part = 0; part < parts_.size(); ++part) {
-      for (const auto& [link, place] : parts_[part].model.names.link) link_of.emplace(prefixed(part, link), Ground{part, place.slot, place.in_body});
+      for (const auto& [link, place] : parts_[part].model.names.link) link_of.emplace(prefixed(part, link), Ground{part, place.slot, isometry(place.in_body)});
     }
     for (std::size_t part = 0; part < parts_.size(); ++part) {
       const std::string& parent = parts_[part].parent;
       if (parent.empty()) {
-        ground_.push_back({part, 0, Pose::Identity()});
+        ground_.push_back({part, 0, Isometry::Identity()});
         continue;
       }
       const auto found = link_of.find(parent);
@@ -102,7 +102,7 @@ class Merger {
       const Ground& below = ground_[ground.part];
       ground = {below.part, below.slot, below.pose * ground.pose};
     }
-    ground.pose = ground.pose * parts_[part].pose;
+    ground.pose = ground.pose * isometry(parts_[part].pose);
     placed[part] = true;
     part_order_.push_back(part);
   }
@@ -209,14 +209,14 @@ class Merger {
     });
   }
 
-  void place_root(const Pose& pose, Index slot) {
+  void place_root(const Isometry& pose, Index slot) {
     BodyConstants<double>& constants = model_.constants;
-    Pose root = Pose::Identity();
+    Isometry root = Isometry::Identity();
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) root.linear()(row, column) = constants.tree_placement(slot, 3 * row + column);
       root.translation()[row] = constants.tree_placement(slot, 9 + row);
     }
-    const Pose placed = pose * root;
+    const Isometry placed = pose * root;
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) constants.tree_placement(slot, 3 * row + column) = placed.linear()(row, column);
       constants.tree_placement(slot, 9 + row) = placed.translation()[row];
@@ -232,7 +232,7 @@ class Merger {
     const Model& from = parts_[part].model;
     for (const auto& [link, place] : from.names.link) {
       // what is fixed to the world moves with the model's idea of it
-      const Pose pose = place.slot == 0 ? ground_[part].pose * place.in_body : place.in_body;
+      const Pose pose = place.slot == 0 ? pose_of(ground_[part].pose * isometry(place.in_body)) : place.in_body;
       const std::string name = prefixed(part, link);
       if (!model_.names.link.emplace(name, LinkPlace{carrying_slot(part, place.slot), pose}).second) fail("links", name);
     }
@@ -259,7 +259,7 @@ class Merger {
       const Model& from = parts_[part].model;
       for (const std::vector<BodyShape>* shapes : {&from.shapes, &from.welded.shapes}) {
         for (BodyShape shape : *shapes) {
-          if (shape.slot == 0) shape.pose = ground_[part].pose * shape.pose;
+          if (shape.slot == 0) shape.pose = pose_of(ground_[part].pose * isometry(shape.pose));
           shape.slot = carrying_slot(part, shape.slot);
           shape.link = prefixed(part, shape.link);
           if (!one_source && shape.shape.kind == ShapeKind::mesh) {

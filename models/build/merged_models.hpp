@@ -20,9 +20,9 @@ namespace linden {
 
 struct PlacedModel {
   Model model;
-  std::string name;              // before the names of its links and joints; empty: they stay as they are
-  Pose pose = Pose::Identity();  // of what the model takes for the world
-  std::string parent{};          // link that it hangs from, as the whole calls it, "crane/hook"; empty: the world
+  std::string name;      // before the names of its links and joints; empty: they stay as they are
+  Pose pose{};           // of what the model takes for the world
+  std::string parent{};  // link that it hangs from, as the whole calls it, "crane/hook"; empty: the world
 };
 
 /// Throws InputError where there is no model, a pose is not finite, two links, joints or coordinates end up with one name, or a model hangs

@@ -8,6 +8,7 @@
 
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
+#include "models/build/isometry.hpp"
 #include "models/shapes/mesh_box.hpp"
 #include "models/shapes/mesh_path.hpp"
 
@@ -30,6 +31,7 @@ class Touch {
 
   void add(const BodyShape& body) {
     const std::array<double, 3>& size = body.shape.size;
+    const Isometry pose = isometry(body.pose);
     switch (body.shape.kind) {
       case ShapeKind::sphere: add_sphere(body, Vector3d::Zero(), size[0]); break;
       case ShapeKind::box: {
@@ -39,14 +41,14 @@ class Touch {
       }
       case ShapeKind::cylinder:
         for (const double z : ends_of(size[1])) {
-          const Vector3d center = body.pose * Vector3d(0, 0, z), axis = body.pose.linear().col(2).normalized();
+          const Vector3d center = pose * Vector3d(0, 0, z), axis = pose.linear().col(2).normalized();
           contacts_.rims.push_back({body.slot, array_of(center), array_of(axis), size[0]});
         }
         break;
       case ShapeKind::capsule:
         for (const double z : ends_of(size[1])) {
           add_sphere(body, {0, 0, z}, size[0]);
-          if (z != 0) contacts_.spheres.back().outward = array_of((z < 0 ? -1 : 1) * body.pose.linear().col(2).normalized());
+          if (z != 0) contacts_.spheres.back().outward = array_of((z < 0 ? -1 : 1) * pose.linear().col(2).normalized());
         }
         add_block(body, Vector3d::Zero(), {0, 0, size[1]}, size[0]);
         break;
@@ -62,14 +64,15 @@ class Touch {
 
  private:
   void add_sphere(const BodyShape& body, const Vector3d& center, double radius) {
-    contacts_.spheres.push_back({body.slot, array_of(body.pose * center), radius});
+    contacts_.spheres.push_back({body.slot, array_of(isometry(body.pose) * center), radius});
   }
 
   /// Nothing where all its edges are 0.
   void add_block(const BodyShape& body, const Vector3d& middle, const Vector3d& edges, double radius) {
     if (edges.isZero()) return;
-    const auto axis = [&](int k) { return array_of(body.pose.linear().col(k).normalized()); };
-    contacts_.blocks.push_back({body.slot, array_of(body.pose * middle), {axis(0), axis(1), axis(2)}, array_of(edges / 2), radius});
+    const Isometry pose = isometry(body.pose);
+    const auto axis = [&](int k) { return array_of(pose.linear().col(k).normalized()); };
+    contacts_.blocks.push_back({body.slot, array_of(pose * middle), {axis(0), axis(1), axis(2)}, array_of(edges / 2), radius});
   }
 
   void add_corners(const BodyShape& body, const MeshBox& box) {

@@ -47,13 +47,13 @@ LinkInertia in_own_frame(const CollisionShape& shape, double density) {
   return {};
 }
 
-LinkInertia placed(const LinkInertia& inertia, const Pose& pose) {
+LinkInertia placed(const LinkInertia& inertia, const Isometry& pose) {
   return {inertia.mass, pose * inertia.center, pose.linear() * inertia.about_center * pose.linear().transpose()};
 }
 
 }  // namespace
 
-LinkInertia shape_inertia(const LinkShape& shape, double density) { return placed(in_own_frame(shape.shape, density), shape.pose); }
+LinkInertia shape_inertia(const LinkShape& shape, double density) { return placed(in_own_frame(shape.shape, density), isometry(shape.pose)); }
 
 ShapeMass::ShapeMass(double density, std::string source) : density_(density), source_(std::move(source)) {
   if (!(density > 0) || !std::isfinite(density)) {
@@ -78,9 +78,9 @@ LinkInertia ShapeMass::mesh_inertia(const std::string& link, const LinkShape& sh
   }
   if (solid.box.isEmpty()) return {};
   if (!solid.closed) {
-    return placed(box_inertia(density_ * solid.box.volume(), solid.box.sizes(), solid.box.center()), shape.pose);
+    return placed(box_inertia(density_ * solid.box.volume(), solid.box.sizes(), solid.box.center()), isometry(shape.pose));
   }
-  return placed({density_ * solid.volume, solid.center, density_ * solid.about_center}, shape.pose);
+  return placed({density_ * solid.volume, solid.center, density_ * solid.about_center}, isometry(shape.pose));
 }
 
 LinkInertia ShapeMass::sum_of(const std::string& link, const std::vector<LinkShape>& shapes) {

@@ -12,6 +12,7 @@
 
 #include "layout/support/text_file.hpp"
 #include "layout/support/words.hpp"
+#include "models/build/builder.hpp"
 #include "models/shapes/shape_mass.hpp"
 #include "models/urdf/urdf_check.hpp"
 

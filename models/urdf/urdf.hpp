@@ -26,7 +26,8 @@
 #include <optional>
 #include <string>
 
-#include "models/build/builder.hpp"
+#include "layout/model.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "layout/support/words.hpp"
+#include "models/build/isometry.hpp"
 #include "models/urdf/urdf_numbers.hpp"
 
 namespace linden {
@@ -21,7 +22,7 @@ class Reader {
   std::optional<LinkShape> read(const XMLElement& holder) {
     const XMLElement* geometry = holder.FirstChildElement("geometry");
     for (const XMLElement* element = geometry ? geometry->FirstChildElement() : nullptr; element; element = element->NextSiblingElement()) {
-      if (std::optional<CollisionShape> shape = shape_of(*element)) return LinkShape{pose_of(holder), std::move(*shape)};
+      if (std::optional<CollisionShape> shape = shape_of(*element)) return LinkShape{origin_of(holder), std::move(*shape)};
     }
     // a shape that is not known has been told already
     if (!geometry || !geometry->FirstChildElement()) {
@@ -71,10 +72,10 @@ class Reader {
     return {ShapeKind::mesh, scaled ? numbers_.three(owner_, element, "scale") : std::array<double, 3>{1, 1, 1}, file.Value()};
   }
 
-  Pose pose_of(const XMLElement& holder) const {
-    Pose pose = Pose::Identity();
+  Pose origin_of(const XMLElement& holder) const {
+    Isometry pose = Isometry::Identity();
     const XMLElement* origin = numbers_.origin(owner_, holder);
-    if (!origin) return pose;
+    if (!origin) return pose_of(pose);
     if (origin->FindAttribute("xyz")) {
       const std::array<double, 3> xyz = numbers_.three(owner_, *origin, "xyz");
       pose.translation() = Eigen::Vector3d(xyz[0], xyz[1], xyz[2]);
@@ -86,7 +87,7 @@ class Reader {
       pose.linear() = (AngleAxisd(rpy[2], Vector3d::UnitZ()) * AngleAxisd(rpy[1], Vector3d::UnitY()) *
                        AngleAxisd(rpy[0], Vector3d::UnitX())).toRotationMatrix();
     }
-    return pose;
+    return pose_of(pose);
   }
 
   std::string owner_;

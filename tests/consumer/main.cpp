@@ -2,8 +2,12 @@
 #include <cmath>
 #include <cstdio>
 
-#include "engine/simulation.hpp"
-#include "models/urdf/urdf.hpp"
+#include <linden/engine/simulation.hpp>
+#include <linden/models/urdf/urdf.hpp>
+
+#if __has_include("engine/simulation.hpp") || __has_include("layout/model.hpp") || __has_include(<models/urdf/urdf.hpp>)
+#error "linden's folders are on the include path under names that anybody may have"
+#endif
 
 int main(int, char** arguments) {
   linden::Simulation simulation(linden::load_urdf(arguments[1], linden::Base::fixed), {.step = 1e-3});

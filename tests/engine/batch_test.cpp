@@ -8,6 +8,7 @@
 #include "engine/initial_state.hpp"
 #include "engine/simulation.hpp"
 #include "layout/support/input_error.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 
@@ -64,10 +65,8 @@ TEST_CASE("every instance moves as a simulation of its own, with any set of inst
                                 shared(own_model("humanoid.urdf", Base::floating)), shared(own_model("hand.urdf", Base::fixed))};
   for (const SharedModel& model : models) {
     for (const Instructions instructions : all_instructions()) {
-      BatchOptions options;
-      options.tolerance = 1e-13;
-      options.instructions = instructions;
-      Batch batch(model, 19, options);
+      const Options options{.tolerance = 1e-13};
+      Batch batch(model, 19, options, {}, {.instructions = instructions});
       const auto spread = [](std::int64_t i) { return i % 5 == 0 ? 2.0 : 0.3; };
       for (std::int64_t i = 0; i < batch.size(); ++i) start(batch, i, static_cast<std::uint64_t>(i) + 1, spread(i));
       batch.step(60);
@@ -94,9 +93,7 @@ template <class AnyBatch>
 void check_bits() {
   const SharedModel model = shared(random_tree({.bodies = 10, .seed = 8}));
   const auto run = [&](std::int64_t size, int threads, std::int64_t first, const std::vector<std::int64_t>& parts) {
-    BatchOptions options;
-    options.threads = threads;
-    AnyBatch batch(model, size, options);
+    AnyBatch batch(model, size, {}, {}, {.threads = threads});
     // some fast, so that neighbours differ in what they need
     for (std::int64_t i = 0; i < size; ++i) start(batch, i, static_cast<std::uint64_t>(first + i), (first + i) % 3 == 0 ? 4.0 : 0.2);
     for (const std::int64_t steps : parts) batch.step(steps);
@@ -126,7 +123,7 @@ TEST_CASE("of 10,000 instances with a poisoned one 9,999 end as without it, and 
   const SharedModel model = shared(chain(3));
   constexpr std::int64_t kPoisoned = 4321;
   const auto run = [&](bool poison) {
-    BatchOptions options;
+    Options options;
     options.max_splits = 2;
     auto batch = std::make_unique<Batch>(model, 10'000, options);
     batch->reset_all([&](std::int64_t i, std::span<double> q, std::span<double> v) {
@@ -179,7 +176,7 @@ TEST_CASE("an instance that is reset starts a new episode, the same as the first
 
 TEST_CASE("a step that is too large for the lanes is taken alone, split as a simulation would split it") {
   const SharedModel model = shared(chain(10));
-  BatchOptions options;
+  Options options;
   options.step = 1e-2;
   options.tolerance = 1e-12;
   Batch batch(model, 40, options);
@@ -204,7 +201,7 @@ TEST_CASE("a step that is too large for the lanes is taken alone, split as a sim
 TEST_CASE("forces given from outside do the work they do in a simulation") {
   const SharedModel model = shared(own_model("humanoid.urdf", Base::floating));
   const Index nv = model->tree.shape.velocities;
-  BatchOptions options;
+  Options options;
   options.tolerance = 1e-13;
   options.gravity = {0, 0, 0};
   Batch batch(model, 5, options);
@@ -230,11 +227,9 @@ TEST_CASE("forces given from outside do the work they do in a simulation") {
 
 TEST_CASE("instances with masses of their own move as models with those masses") {
   const Model plain = own_model("arm.urdf", Base::fixed);
-  BatchOptions options;
-  options.tolerance = 1e-13;
+  const Options options{.tolerance = 1e-13};
   for (const Instructions instructions : all_instructions()) {
-    options.instructions = instructions;
-    Batch batch(plain, 6, options);
+    Batch batch(plain, 6, options, {}, {.instructions = instructions});
     const auto heavier = [](std::array<double, 10> inertia, std::int64_t i) {
       for (double& number : inertia) number *= 1 + 0.3 * static_cast<double>(i);
       return inertia;
@@ -349,9 +344,7 @@ TEST_CASE("thousands of steps taken alone leave nothing behind on their thread")
     batch.reset(i, q, v);
   };
   const auto run = [&](std::int64_t size, int threads, std::int64_t first, const std::vector<std::int64_t>& parts, bool again = false) {
-    BatchOptions options;
-    options.threads = threads;
-    Batch batch(model, size, options, effects);
+    Batch batch(model, size, {}, effects, {.threads = threads});
     for (std::int64_t i = 0; i < size; ++i) start_one(batch, i, first + i);
     if (again) {
       batch.step(123);
@@ -404,7 +397,7 @@ TEST_CASE("views lead to where the numbers lie") {
 TEST_CASE("what makes no sense for a batch is refused with what was found and expected") {
   const SharedModel model = shared(chain(3));
   const auto with = [](const auto& change) {
-    BatchOptions options;
+    Options options;
     change(options);
     return options;
   };
@@ -412,7 +405,7 @@ TEST_CASE("what makes no sense for a batch is refused with what was found and ex
   CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.solver = Solver::riqn; })), Catch::Contains("riqn"));
   CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.guess = FirstGuess::ig3; })), Catch::Contains("ig3"));
   CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.stop = StopTest::absolute; })), Catch::Contains("absolute"));
-  CHECK_THROWS_WITH(Batch(model, 4, with([](auto& o) { o.threads = -1; })), Catch::Contains("-1 threads"));
+  CHECK_THROWS_WITH(Batch(model, 4, {}, {}, {.threads = -1}), Catch::Contains("-1 threads"));
   CHECK_THROWS_AS(Batch(model, 4, with([](auto& o) { o.step = 0; })), InputError);
   Batch batch(model, 4);
   const std::vector<double> three(3, 0.0), two(2, 0.0), broken{0, std::nan(""), 0};

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 
@@ -183,7 +184,7 @@ TEST_CASE("what bounces ever lower under gravity comes to rest on its limit", "[
 TEST_CASE("instances of a batch bounce as simulations do", "[blows]") {
   const Model model = links_in_a_row(3);
   const Effects effects = limited(3, 0.1, 0.8);
-  BatchOptions options;
+  Options options;
   options.gravity = {0, 0, -9.81};
   Batch batch(model, 11, options, effects);
   const auto speeds = [](std::int64_t i) { return std::vector<double>{1.0 + 0.1 * static_cast<double>(i), -2.0, 1.5}; };

@@ -383,7 +383,7 @@ TEST_CASE("a scene may name its order, and a tolerance that it does not name goe
 }
 
 TEST_CASE("a batch knows order 2 only and says so") {
-  BatchOptions options;
+  Options options;
   options.order = 4;
   CHECK_THROWS_WITH(Batch(chain(3), 4, options), Catch::Contains("a batch has no order \"4\""));
   options.order = 2;

@@ -67,6 +67,7 @@ const Row table[] = {
     {"block with effects: worse", block, {.corrected = true, .slow = true, .corrections = 20}, Next::correct},
     {"block with effects: a state changes", block, {.solved = true, .changed = true, .updates = 23}, Next::update_states},
     {"block with effects: again and again", block, {.solved = true, .changed = true, .updates = 24}, Next::give_up},
+    {"block with effects: and is not even solved", block, {.updates = 24}, Next::give_up},
 };
 
 TEST_CASE("what happens next follows from what is seen of an instance") {

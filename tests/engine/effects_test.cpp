@@ -7,6 +7,7 @@
 #include "engine/drift.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "folder.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 
@@ -401,10 +402,7 @@ TEST_CASE("a batch with effects moves as simulations of its own, to the bit what
   constexpr std::int64_t kSize = 11;
   constexpr int kSteps = 350;
   const auto rolled = [&](int threads, std::int64_t first, std::int64_t size, std::vector<std::int64_t> parts) {
-    BatchOptions options;
-    static_cast<Options&>(options) = scene.options;
-    options.threads = threads;
-    Batch batch(model, size, options, scene.effects);
+    Batch batch(model, size, scene.options, scene.effects, {.threads = threads});
     for (std::int64_t i = 0; i < size; ++i) batch.reset(i, start(first + i), rest);
     for (const std::int64_t steps : parts) batch.step(steps);
     CHECK(batch.summary().frozen == 0);
@@ -429,8 +427,7 @@ TEST_CASE("a batch with effects moves as simulations of its own, to the bit what
 TEST_CASE("instances of a batch have servo targets of their own", "[effects][batch]") {
   Effects effects;
   effects.servos = {{.row = 0, .stiffness = 30, .damping = 1.5, .target = 0.2}};
-  BatchOptions options;
-  static_cast<Options&>(options) = still();
+  const Options options = still();
   Batch batch(rotor(), 9, options, effects);
   batch.step(10);
   for (std::int64_t i = 0; i < 9; ++i) batch.servo_targets()(i, 0) = 0.1 * static_cast<double>(i);
@@ -446,8 +443,7 @@ TEST_CASE("instances of a batch have joint friction of their own", "[effects][ba
   const double inertia = 0.02, v = 2;
   Effects effects;
   effects.friction = {{.row = 0, .force = 0.4}};
-  BatchOptions options;
-  static_cast<Options&>(options) = still();
+  const Options options = still();
   Batch batch(rotor(inertia), 9, options, effects);
   for (std::int64_t i = 0; i < 9; ++i) {
     batch.friction()(i, 0) = 0.05 * static_cast<double>(i + 1);
@@ -472,7 +468,7 @@ TEST_CASE("what is an instance's own stays its own where it is stepped alone", "
   Effects effects;
   effects.friction = {{.row = 0, .force = 0.1}};
   effects.servos = {{.row = 1, .stiffness = 0.5, .damping = 0.01, .target = 0}};
-  BatchOptions options;
+  Options options;
   Batch batch(hand, 5, options, effects);
   const auto friction = [](std::int64_t i) { return 2e-3 * static_cast<double>(i); };
   const auto target = [](std::int64_t i) { return 0.1 * static_cast<double>(i); };
@@ -527,7 +523,7 @@ TEST_CASE("every effect moves an instance of a batch as it moves a simulation, i
   Simulation simulation(chained, {}, joints);
   set(simulation, q, v);
   run(simulation, kSteps);
-  BatchOptions options;
+  Options options;
   Batch batch(chained, 5, options, joints);
   CHECK(distance(simulation.positions(), end_of(batch)) < 1e-8);
   FloatBatch single(chained, 5, options, joints);

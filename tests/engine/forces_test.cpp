@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/random.hpp"
 #include "scenes.hpp"
 
@@ -25,11 +26,6 @@ Model rotor(double inertia = 0.02) { return one_joint(JointType::revolute, 1, in
 Model body(double mass = 2) { return one_joint(JointType::free, mass, 0.01); }
 
 Options still(double step = 1e-3) { return {.step = step, .gravity = {0, 0, 0}}; }
-BatchOptions batch_options(const Options& options) {
-  BatchOptions result;
-  static_cast<Options&>(result) = options;
-  return result;
-}
 
 void set(Simulation& simulation, std::vector<double> q, std::vector<double> v) {
   simulation.set_positions(q);
@@ -278,7 +274,7 @@ TEST_CASE("a target that is set goes over the servo's table until the table has 
   CHECK_THROWS_AS(without.set_servo_targets(std::vector<double>{nan}), InputError);
 
   effects.servos[0].target_over_time = {{0, 0}, {7, 0.5}};
-  Batch batch(rotor(), 5, batch_options(still()), effects);
+  Batch batch(rotor(), 5, still(), effects);
   for (std::int64_t i = 0; i < 5; ++i) CHECK(std::isnan(batch.servo_targets()(i, 0)));
   batch.servo_targets()(2, 0) = -0.3;
   batch.step(3000);
@@ -411,7 +407,7 @@ TEST_CASE("a humanoid that starts with its joints at and beyond all their limits
       for (JointLimit& limit : effects.limits) limit.velocity = velocity;
     }
     Simulation simulation(humanoid, still(), effects);
-    Batch batch(humanoid, 40, batch_options(still()), effects);
+    Batch batch(humanoid, 40, still(), effects);
     batch.reset_all([&](std::int64_t i, std::span<double> q, std::span<double> v) {
       const InitialState start = random_state(*humanoid, static_cast<std::uint64_t>(i + 120), 1);
       std::ranges::copy(start.positions, q.begin());
@@ -457,7 +453,7 @@ TEST_CASE("forces over time and limits of velocity move an instance of a batch a
   CHECK(std::ranges::equal(whole.momenta(), parts.momenta()));
 
   const auto rolled = [&](std::int64_t size, std::int64_t which, const std::vector<std::int64_t>& steps) {
-    Batch batch(model, size, batch_options({}), effects);
+    Batch batch(model, size, {}, effects);
     for (std::int64_t i = 0; i < size; ++i) {
       std::vector<double> mine = q;
       mine[0] += 0.01 * static_cast<double>(i - which);
@@ -474,7 +470,7 @@ TEST_CASE("forces over time and limits of velocity move an instance of a batch a
   CHECK(rolled(4, 1, {1, 50, kSteps - 51}) == alone);
 
   // an instance that starts late is at its own time, in single precision nearly and after long
-  FloatBatch single(model, 3, batch_options({}), effects);
+  FloatBatch single(model, 3, {}, effects);
   for (std::int64_t i = 0; i < 3; ++i) single.reset(i, q, v);
   single.step(20'037);
   single.reset(1, q, v);
@@ -487,7 +483,7 @@ TEST_CASE("forces over time and limits of velocity move an instance of a batch a
 TEST_CASE("in single precision a push after an hour still gives its impulse", "[forces][batch]") {
   Effects effects;
   effects.wrenches = {{.slot = 1, .force = {2, 0, 0}, .from = 360.0523, .to = 360.1004}};
-  FloatBatch batch(body(2), 1, batch_options(still(1e-2)), effects);
+  FloatBatch batch(body(2), 1, still(1e-2), effects);
   batch.reset(0, std::vector<double>{0, 0, 0, 0, 0, 0, 1}, std::vector<double>{0, 0, 0, 1, 0, 0});
   batch.step(36'020);
   CHECK(batch.momenta()(0, 3) == Approx(2 + 2 * 0.0481).epsilon(1e-4));

@@ -7,6 +7,7 @@
 #include "engine/batch.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "folder.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "models/build/random.hpp"
 #include "scenes.hpp"

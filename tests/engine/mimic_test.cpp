@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {
@@ -267,7 +268,7 @@ struct Finger {
       link.axis = Eigen::Vector3d::UnitY();
       if (k > 0) {
         link.parent = fmt::format("link{}", k - 1);
-        link.placement = Pose(Eigen::Translation3d(length[k - 1], 0, 0));
+        link.placement = Isometry(Eigen::Translation3d(length[k - 1], 0, 0));
         link.mimic = "hinge0";
         link.multiplier = multiplier[k];
       }
@@ -343,7 +344,7 @@ TEST_CASE("a finger without inertia of its own keeps its energy on a hand that m
     link.parent = k == 0 ? "palm" : fmt::format("link{}", k - 1);
     link.joint = fmt::format("hinge{}", k);
     link.axis = Eigen::Vector3d::UnitY();
-    link.placement = Pose(Eigen::Translation3d(0.03, 0, 0));
+    link.placement = Isometry(Eigen::Translation3d(0.03, 0, 0));
     if (k > 0) link.mimic = "hinge0";
     link.multiplier = finger.multiplier[k];
     if (k == 2) link.inertia = {finger.mass, {finger.center, 0, 0}, finger.moment * Eigen::Matrix3d::Identity()};
@@ -377,9 +378,7 @@ TEST_CASE("instances with massless followers, friction and limits move as a simu
   effects.friction = {{.row = 0, .force = 1e-3}};
   effects.limits = {{.row = 0, .lower = -1, .upper = 0.5}};
   const auto run_batch = [&](std::int64_t size, int threads, std::initializer_list<int> parts) {
-    BatchOptions options;
-    options.threads = threads;
-    Batch batch(model, size, options, effects);
+    Batch batch(model, size, {}, effects, {.threads = threads});
     for (std::int64_t i = 0; i < size; ++i) {
       batch.reset(i, std::vector<double>(3, 0.0), std::vector<double>{0.5 * static_cast<double>(i % 5) - 2, 0, 0});
     }

@@ -5,7 +5,9 @@
 
 #include "engine/initial_state.hpp"
 #include "layout/contacts.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
+#include "models/build/isometry.hpp"
 #include "models/shapes/contacts_of.hpp"
 #include "tests/reference/closed_forms.hpp"
 #include "tests/reference/coriolis_plain.hpp"
@@ -257,7 +259,7 @@ TEST_CASE("a ball rolls down the plain simulator's ground as solid balls do", "[
 TEST_CASE("a cylinder rolls down the plain simulator's ground as solid cylinders do", "[plain]") {
   const double slope = 0.3, r = 0.1;
   LinkShape cylinder;
-  cylinder.pose.linear() = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  cylinder.pose = pose_of(Isometry(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX())));
   cylinder.shape.kind = ShapeKind::cylinder;
   cylinder.shape.size = {r, 0.2, 0};
   const OnSlope rolls(cylinder, r, 0.5 * 2 * r * r, slope, 0.5);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "engine/batch.hpp"
+#include "engine/effects/effect_plan.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "layout/support/input_error.hpp"
 #include "models/build/builder.hpp"
@@ -34,8 +35,8 @@ Model one_body(JointType type, double mass, const Vector3d& center = Vector3d::Z
   return TreeBuilder("one body").add(link).build();
 }
 
-BatchOptions options_of(double step, const std::array<double, 3>& gravity) {
-  BatchOptions options;
+Options options_of(double step, const std::array<double, 3>& gravity) {
+  Options options;
   options.step = step;
   options.gravity = gravity;
   options.tolerance = 1e-13;
@@ -177,7 +178,7 @@ TEST_CASE("a pendulum swings alike whatever its mass, a mass on a spring with a 
   constexpr int kSteps = 1500;
   SECTION("pendulum") {
     const Model pendulum = one_body(JointType::revolute, 2, {0, 0, -0.4}, Vector3d::UnitY());
-    const BatchOptions options = options_of(1e-3, {0, 0, -kG});
+    const Options options = options_of(1e-3, {0, 0, -kG});
     Batch batch(pendulum, 9, options);
     draw_all(batch, randomization, {});
     batch.reset_all([](std::int64_t, std::span<double> q, std::span<double>) { q[0] = 1; });
@@ -191,7 +192,7 @@ TEST_CASE("a pendulum swings alike whatever its mass, a mass on a spring with a 
     const double mass = 2, stiffness = 50;
     Effects effects;
     effects.springs = {{.row = 0, .stiffness = stiffness}};
-    const BatchOptions options = options_of(1e-3, {0, 0, 0});
+    const Options options = options_of(1e-3, {0, 0, 0});
     Batch batch(one_body(JointType::prismatic, mass), 9, options, effects);
     draw_all(batch, randomization, effects);
     batch.reset_all([](std::int64_t, std::span<double> q, std::span<double>) { q[0] = 1; });
@@ -210,7 +211,7 @@ TEST_CASE("a servo sags by its load over its drawn stiffness, and its damping go
   Effects effects;
   effects.servos = {{.row = 0, .stiffness = stiffness, .damping = damping}};
   const Randomization randomization{.masses = {}, .friction = {}, .joint_friction = {}, .gains = Range{0.5, 2}};
-  const BatchOptions options = options_of(1e-3, {0, 0, -kG});
+  const Options options = options_of(1e-3, {0, 0, -kG});
   const Model slider = one_body(JointType::prismatic, mass);
   Batch batch(slider, 11, options, effects);
   draw_all(batch, randomization, effects);
@@ -242,7 +243,7 @@ TEST_CASE("a block on a slope stays where its drawn friction is more than the sl
   const Box box;
   const double slope = std::atan(0.7);
   const Randomization randomization{.masses = {}, .friction = Range{0.4, 1.0}, .joint_friction = {}, .gains = {}};
-  const BatchOptions options = options_of(1e-3, {kG * std::sin(slope), 0, -kG * std::cos(slope)});
+  const Options options = options_of(1e-3, {kG * std::sin(slope), 0, -kG * std::cos(slope)});
   Batch batch(box.model, 40, options, box.effects);
   draw_all(batch, randomization, box.effects);
   const std::vector<double> start = box.lying(slope);
@@ -278,7 +279,7 @@ TEST_CASE("a simulation of what was drawn moves as the instance of the batch, st
     // servos that a step does not resolve are taken the more implicitly the lighter the model is that the plan was made for
     const bool stiff = stiffer > 1;
     if (stiff) arm.randomization.masses.reset();
-    const BatchOptions options = options_of(1e-3, {0, 0, -kG});
+    const Options options = options_of(1e-3, {0, 0, -kG});
     const EffectPlan plan(arm.model, options, arm.effects);
     CHECK(std::ranges::all_of(plan.servo_ratio, [&](double ratio) { return stiff ? 0.5 * ratio > 1 : 3 / 0.7 * ratio < 1; }));
     Batch batch(arm.model, 6, options, arm.effects);
@@ -310,7 +311,7 @@ TEST_CASE("what was drawn acts where an instance is stepped alone, too", "[rando
   Effects effects;
   effects.servos = {{.row = 1, .stiffness = 0.5, .damping = 0.01, .target = 0.4}};
   const Randomization randomization{.masses = {}, .friction = {}, .joint_friction = {}, .gains = Range{0.2, 4}};
-  const BatchOptions options = options_of(1e-3, {0, 0, -kG});
+  const Options options = options_of(1e-3, {0, 0, -kG});
   Batch batch(hand, 4, options, effects);
   draw_all(batch, randomization, effects);
   batch.step(200);
@@ -382,9 +383,7 @@ TEST_CASE("what is drawn gives the same bits in any company, on any threads, in 
   const Randomization randomization{.masses = Range{0.8, 1.2}, .friction = Range{0.2, 1}, .joint_friction = Range{0.5, 2}, .gains = Range{0.5, 2}};
   std::int64_t rescued = 0;
   const auto run = [&](std::int64_t size, int threads, std::int64_t first, const std::vector<std::int64_t>& parts, bool again = false) {
-    BatchOptions options;
-    options.threads = threads;
-    Batch batch(model, size, options, effects);
+    Batch batch(model, size, {}, effects, {.threads = threads});
     const auto begin = [&] {
       for (std::int64_t i = 0; i < size; ++i) {
         const std::int64_t number = first + i;
@@ -436,7 +435,7 @@ TEST_CASE("factors of one and the effects' own friction change no bit", "[random
       }
       return numbers;
     };
-    const BatchOptions options = options_of(1e-3, {0, 0, -kG});
+    const Options options = options_of(1e-3, {0, 0, -kG});
     if (single) {
       CHECK(run(FloatBatch(arm.model, 5, options, arm.effects), true) == run(FloatBatch(arm.model, 5, options, arm.effects), false));
     } else {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "engine/batch.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 
@@ -76,7 +77,7 @@ TEST_CASE("arms on servos come to rest at their sag, in simulations and batches"
       const Model model = hanging(joints);
       Effects effects;
       effects.servos = servo_everywhere(model, 40, 4, std::vector<double>(static_cast<std::size_t>(joints), 0.5));
-      BatchOptions options;
+      Options options;
       options.step = h;
       Simulation simulation(model, options, effects);
       Batch batch(model, 3, options, effects);
@@ -137,7 +138,7 @@ TEST_CASE("a torque that changes every step is no reason to refuse one", "[rest]
 TEST_CASE("what is held reads zero, whatever holds it and at any step", "[rest]") {
   const Model model = hanging(2);
   for (const double h : {1e-4, 1e-3, 1e-2}) {
-    BatchOptions options;
+    Options options;
     options.step = h;
     const std::vector<double> start{0.6, -0.2};
     Effects friction, limits, servos, one_each;

@@ -8,6 +8,7 @@
 #include "engine/scene/scene_yaml.hpp"
 #include "engine/simulation.hpp"
 #include "models/build/generators.hpp"
+#include "models/build/isometry.hpp"
 #include "models/build/random.hpp"
 #include "models/urdf/urdf.hpp"
 #include "tests/engine/command_line.hpp"
@@ -399,9 +400,10 @@ TEST_CASE("a wrench acts where its link is, behind fixed joints too", "[scene]")
   const std::vector<BodyWrench>& wrenches = s.effects.wrenches;
   REQUIRE(wrenches.size() == 3);
   const LinkPlace flange = s.model.names.link.at("tool_flange");
-  const Eigen::Vector3d point = flange.in_body * Eigen::Vector3d(0.1, 0.2, 0.3),
-                        force = flange.in_body.linear() * Eigen::Vector3d(1, 2, 3),
-                        moment = flange.in_body.linear() * Eigen::Vector3d(4, 5, 6);
+  const Isometry in_body = isometry(flange.in_body);
+  const Eigen::Vector3d point = in_body * Eigen::Vector3d(0.1, 0.2, 0.3),
+                        force = in_body.linear() * Eigen::Vector3d(1, 2, 3),
+                        moment = in_body.linear() * Eigen::Vector3d(4, 5, 6);
   CHECK(wrenches[0].slot == flange.slot);
   CHECK_FALSE(wrenches[0].in_world);
   for (int k = 0; k < 3; ++k) {
@@ -486,7 +488,7 @@ TEST_CASE("several models are one system, placed and named", "[scene]") {
   CHECK(velocity(s, "humanoid/base.vx") == Approx(std::cos(0.5)));
   CHECK(velocity(s, "humanoid/base.vy") == Approx(-std::sin(0.5)));
   CHECK(s.effects.damping.at(0).row == row_of(s.model, "humanoid/neck_yaw"));
-  CHECK(s.model.names.link.at("left/base_link").in_body.translation().y() == 1);
+  CHECK(s.model.names.link.at("left/base_link").in_body.shift[1] == 1);
 }
 
 TEST_CASE("models in one scene move as each alone", "[scene]") {

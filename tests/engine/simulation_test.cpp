@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "tests/engine/folder.hpp"
+#include "models/build/builder.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {

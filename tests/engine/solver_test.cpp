@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "tests/engine/scenes.hpp"
+#include "models/build/builder.hpp"
 #include "tests/kernels/allocation_counter.hpp"
 
 namespace linden {

@@ -43,7 +43,7 @@ Model ball() {
   link.joint = "base";
   link.type = JointType::free;
   link.inertia = sphere_inertia(1, 0.1, {0, 0, 0});
-  link.shapes = {{Pose::Identity(), {ShapeKind::sphere, {0.1}, ""}}};
+  link.shapes = {{Pose{}, {ShapeKind::sphere, {0.1}, ""}}};
   return TreeBuilder("ball").add(link).build();
 }
 

@@ -7,6 +7,7 @@
 #include "engine/effects/effect_plan.hpp"
 #include "engine/sweeps/sweep_cost.hpp"
 #include "engine/sweeps/sweeps.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 
 namespace linden {

@@ -52,10 +52,7 @@ std::vector<Told> told(const Batch& batch) {
 }
 
 Batch batch_of(const EverydayScene& scene, const std::vector<std::uint64_t>& who, int threads) {
-  BatchOptions options;
-  static_cast<Options&>(options) = scene.options;
-  options.threads = threads;
-  Batch batch(scene.model, static_cast<std::int64_t>(who.size()), options, scene.effects);
+  Batch batch(scene.model, static_cast<std::int64_t>(who.size()), scene.options, scene.effects, {.threads = threads});
   for (std::size_t i = 0; i < who.size(); ++i) {
     const InitialState start = company(scene, who[i]);
     batch.reset(static_cast<std::int64_t>(i), start.positions, start.velocities);

@@ -447,10 +447,7 @@ void check_velocities(const EverydayScene& scene, const Walk& walk, Differences&
 
 void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found) {
   if (!walk.failed.ok()) return;
-  BatchOptions options;
-  static_cast<Options&>(options) = scene.options;
-  options.threads = 1;
-  Batch batch(scene.model, 1, options, scene.effects);
+  Batch batch(scene.model, 1, scene.options, scene.effects, {.threads = 1});
   batch.reset(0, scene.start.positions, scene.start.velocities);
   const Reader reader(scene, walk, "batch");
   std::int64_t taken = 0;

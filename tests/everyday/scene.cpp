@@ -114,15 +114,16 @@ class Maker {
       if (link.type == JointType::free || chance(0.4)) {
         if (round) {
           LinkShape ball;
-          ball.pose.translation() = center;
+          Isometry pose(Eigen::Translation3d{center});
           ball.shape.kind = ShapeKind::sphere;
           ball.shape.size = {0.5 * width, 0, 0};
           if (chance(0.5)) {
             // a cylinder, lying or standing
             ball.shape.kind = ShapeKind::cylinder;
             ball.shape.size[1] = width * random_.uniform(0.2, 2);
-            if (chance(0.7)) ball.pose.linear() = Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitX()).toRotationMatrix();
+            if (chance(0.7)) pose.linear() = Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitX()).toRotationMatrix();
           }
+          ball.pose = pose_of(pose);
           link.shapes = {ball};
         } else {
           link.shapes = {box_shape(size, center)};

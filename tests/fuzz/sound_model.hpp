@@ -10,6 +10,11 @@
 
 namespace linden {
 
+inline bool finite(const Pose& pose) {
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  return std::ranges::all_of(pose.rotation, is_finite) && std::ranges::all_of(pose.shift, is_finite);
+}
+
 inline void require_sound(const Model& model) {
   const Tree& tree = model.tree;
   const auto slots = static_cast<std::size_t>(tree.shape.slots);
@@ -31,10 +36,10 @@ inline void require_sound(const Model& model) {
     require(mimic.leader_slot > 0 && mimic.leader_slot != mimic.follower_slot, "a mimic's leader");
   }
   for (const auto& [link, place] : model.names.link) {
-    require(place.slot >= 0 && place.slot < tree.shape.slots && place.in_body.matrix().allFinite(), "the place of a link");
+    require(place.slot >= 0 && place.slot < tree.shape.slots && finite(place.in_body), "the place of a link");
   }
   for (const BodyShape& shape : model.shapes) {
-    require(shape.slot > 0 && shape.slot < tree.shape.slots && shape.pose.matrix().allFinite(), "the place of a shape");
+    require(shape.slot > 0 && shape.slot < tree.shape.slots && finite(shape.pose), "the place of a shape");
   }
 }
 

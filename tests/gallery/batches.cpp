@@ -45,10 +45,7 @@ struct Rolled {
 
 Rolled roll(const std::vector<std::size_t>& order, int threads, std::int64_t steps, std::int64_t part) {
   const auto model = std::make_shared<const Model>(hinged_chain("block", kLinks, 0.1, [](Index) { return rod(1, 0.1); }));
-  BatchOptions options;
-  options.step = 1e-3;
-  options.threads = threads;
-  Batch batch(model, static_cast<std::int64_t>(order.size()), options);
+  Batch batch(model, static_cast<std::int64_t>(order.size()), {.step = 1e-3}, {}, {.threads = threads});
   for (std::size_t i = 0; i < order.size(); ++i) {
     const auto at = static_cast<std::int64_t>(i);
     const Hard& hard = instances()[order[i]];

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "models/build/generators.hpp"
+#include "models/build/builder.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

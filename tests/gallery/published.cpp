@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "tests/gallery/models.hpp"
+#include "models/build/builder.hpp"
 #include "tests/gallery/scenario.hpp"
 
 namespace linden {
@@ -10,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-Pose at(double x, double y, double z) { return Pose(Eigen::Translation3d(x, y, z)); }
+Isometry at(double x, double y, double z) { return Isometry(Eigen::Translation3d(x, y, z)); }
 
 /// Two boxes of 2 kg and 2 m, one on a hinge at (0, 0, 5) and the other across it on a ball joint, let go from horizontal.
 ///
@@ -27,7 +28,7 @@ Model two_boxes() {
   second.parent = "b1";
   second.type = JointType::ball;
   // the body's centre lies at (1, 1, 0) from that of the first, its frame turned by 1.57; the joint at its (-1, 0, 0)
-  second.placement = at(2, 1, 0) * Pose(Eigen::AngleAxisd(1.57, Vector3d::UnitZ())) * at(-1, 0, 0);
+  second.placement = at(2, 1, 0) * Isometry(Eigen::AngleAxisd(1.57, Vector3d::UnitZ())) * at(-1, 0, 0);
   second.inertia = box_inertia(2, {2, 0.2, 0.2}, {1, 0, 0});
   return TreeBuilder("two boxes").add(first).add(second).build();
 }

@@ -4,6 +4,7 @@
 #include "engine/scene/scene.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "layout/support/input_error.hpp"
+#include "models/build/builder.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

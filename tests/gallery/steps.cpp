@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "models/build/generators.hpp"
+#include "models/build/builder.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 #include "tests/reference/closed_forms.hpp"

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 
 namespace linden {

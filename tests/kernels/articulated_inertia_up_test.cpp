@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "kernels/tree/velocity_down.hpp"
+#include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/elimination_plain.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"

@@ -15,6 +15,7 @@
 #include <optional>
 #include <set>
 
+#include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "models/shapes/contacts_of.hpp"
 #include "models/shapes/mesh_box.hpp"
@@ -359,7 +360,7 @@ TEST_CASE("the builder refuses shapes whose sizes are negative or no numbers") {
   CHECK(refusal(box_shape({1, 2, 3}, {0, 0, 0})) == "no error");
   CHECK_THAT(refusal(box_shape({1, -2, 3}, {0, 0, 0})), Contains("code: link \"b\": a collision shape has a negative size"));
   CHECK_THAT(refusal(box_shape({1, 2, 3}, {0, std::numeric_limits<double>::quiet_NaN(), 0})), Contains("not finite"));
-  CHECK(refusal({Pose::Identity(), {ShapeKind::mesh, {1, -1, 1}, "x.stl"}}) == "no error");
+  CHECK(refusal({Pose{}, {ShapeKind::mesh, {1, -1, 1}, "x.stl"}}) == "no error");
 }
 
 TEST_CASE("STL, binary and text, OBJ and COLLADA files of the same points have the same box") {

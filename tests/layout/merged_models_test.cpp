@@ -5,6 +5,7 @@
 
 #include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
+#include "models/build/isometry.hpp"
 #include "models/urdf/urdf.hpp"
 
 using namespace linden;
@@ -17,14 +18,14 @@ const std::string kHand = LINDEN_MODELS_DIR "/hand.urdf";
 const std::string kHumanoid = LINDEN_MODELS_DIR "/humanoid.urdf";
 
 Pose placed(double x, double y, double turn) {
-  Pose pose = Pose::Identity();
+  Isometry pose = Isometry::Identity();
   pose.translation() = Eigen::Vector3d(x, y, 0.3);
   pose.linear() = Eigen::AngleAxisd(turn, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix();
-  return pose;
+  return pose_of(pose);
 }
 
-Pose placement(const Model& model, Index slot) {
-  Pose pose = Pose::Identity();
+Isometry placement(const Model& model, Index slot) {
+  Isometry pose = Isometry::Identity();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       pose.linear()(row, column) = model.constants.tree_placement(slot, 3 * row + column);
@@ -52,7 +53,7 @@ void check_is_in(const PlacedModel& part, const Model& whole) {
     for (int k = 0; k < 10; ++k) CHECK(whole.constants.inertia(slot, k) == model.constants.inertia(i, k));
     for (int k = 0; k < 2; ++k) CHECK(whole.constants.screw(slot, k) == model.constants.screw(i, k));
     CHECK(whole.constants.subtree_mass(slot) == Approx(model.constants.subtree_mass(i)));
-    const Pose expected = model.tree.parent(i) == 0 ? Pose(part.pose * placement(model, i)) : placement(model, i);
+    const Isometry expected = model.tree.parent(i) == 0 ? Isometry(isometry(part.pose) * placement(model, i)) : placement(model, i);
     CHECK(placement(whole, slot).matrix().isApprox(expected.matrix(), 1e-15));
     for (Index k = 0; k < velocity_count(model.tree.kind(i)); ++k) {
       const Index from = model.tree.first_v(i) + k, to = whole.tree.first_v(slot) + k;
@@ -72,15 +73,15 @@ void check_is_in(const PlacedModel& part, const Model& whole) {
   for (const auto& [link, place] : model.names.link) {
     const LinkPlace& found = whole.names.link.at(prefix + link);
     CHECK(found.slot == slot_of[static_cast<std::size_t>(place.slot)]);
-    const Pose expected = place.slot == 0 ? Pose(part.pose * place.in_body) : place.in_body;
-    CHECK(found.in_body.matrix().isApprox(expected.matrix(), 1e-15));
+    const Isometry in_body = isometry(place.in_body), expected = place.slot == 0 ? Isometry(isometry(part.pose) * in_body) : in_body;
+    CHECK(isometry(found.in_body).matrix().isApprox(expected.matrix(), 1e-15));
   }
   for (const auto& [joint, slot] : model.names.slot_of_joint) {
     CHECK(whole.names.slot_of_joint.at(prefix + joint) == slot_of[static_cast<std::size_t>(slot)]);
   }
   for (const BodyShape& shape : model.shapes) {
     const auto found = std::ranges::find_if(whole.shapes, [&](const BodyShape& other) {
-      return other.link == prefix + shape.link && other.pose.matrix() == shape.pose.matrix() && other.shape.kind == shape.shape.kind &&
+      return other.link == prefix + shape.link && other.pose == shape.pose && other.shape.kind == shape.shape.kind &&
              other.shape.size == shape.shape.size;
     });
     REQUIRE(found != whole.shapes.end());
@@ -119,7 +120,7 @@ LinkSpec link_of(const std::string& name, const std::string& parent, JointType t
 TEST_CASE("merged models keep their bodies, names, attributes and mimic joints", "[merged models]") {
   const std::vector<PlacedModel> parts{{load_urdf(kHand), "hand", placed(1, 2, 0.4)},
                                        {load_urdf(kHumanoid, Base::floating), "walker", placed(-1, 0, 1)},
-                                       {load_urdf(kArm), "", Pose::Identity()},
+                                       {load_urdf(kArm), ""},
                                        {random_tree({.bodies = 40}), "random", placed(0, 5, -2)},
                                        {load_urdf(kHand), "other hand", placed(3, 0, 0)}};
   const Model whole = merged(parts, "crowd");
@@ -151,23 +152,23 @@ TEST_CASE("meshes of merged models are found where they were", "[merged models]"
   Model one = chain(1), other = chain(1);
   one.source = LINDEN_MODELS_DIR "/arm.urdf";
   other.source = LINDEN_MODELS_DIR "/scenes/arm.urdf";
-  one.shapes = {{1, "link1", Pose::Identity(), {ShapeKind::mesh, {1, 1, 1}, "hand.urdf"}}};
-  other.shapes = {{1, "link1", Pose::Identity(), {ShapeKind::mesh, {1, 1, 1}, "../hand.urdf"}},
-                  {1, "link1", Pose::Identity(), {ShapeKind::mesh, {1, 1, 1}, "nowhere.stl"}}};
-  const Model apart = merged({{one, "a", Pose::Identity()}, {other, "b", Pose::Identity()}}, "two");
+  one.shapes = {{1, "link1", Pose{}, {ShapeKind::mesh, {1, 1, 1}, "hand.urdf"}}};
+  other.shapes = {{1, "link1", Pose{}, {ShapeKind::mesh, {1, 1, 1}, "../hand.urdf"}},
+                  {1, "link1", Pose{}, {ShapeKind::mesh, {1, 1, 1}, "nowhere.stl"}}};
+  const Model apart = merged({{one, "a"}, {other, "b"}}, "two");
   REQUIRE(apart.shapes.size() == 3);
   CHECK(apart.source.empty());
   CHECK(apart.shapes[0].shape.mesh == LINDEN_MODELS_DIR "/hand.urdf");
   CHECK(apart.shapes[1].shape.mesh == LINDEN_MODELS_DIR "/hand.urdf");
   CHECK(apart.shapes[2].shape.mesh == "nowhere.stl");
-  const Model together = merged({{one, "a", Pose::Identity()}, {one, "b", Pose::Identity()}}, "two");
+  const Model together = merged({{one, "a"}, {one, "b"}}, "two");
   CHECK(together.source == one.source);
   CHECK(together.shapes[1].shape.mesh == "hand.urdf");
 }
 
 TEST_CASE("one model merged with nothing is itself", "[merged models]") {
   for (const Model& model : {load_urdf(kHand), random_tree({.bodies = 30}), humanoids(2)}) {
-    const Model same = merged({{model, "", Pose::Identity()}}, model.names.model);
+    const Model same = merged({{model, ""}}, model.names.model);
     CHECK(same.hash() == model.hash());
     CHECK(same.names.position == model.names.position);
     CHECK(same.names.velocity == model.names.velocity);
@@ -181,20 +182,20 @@ TEST_CASE("warnings of merged models say whose they are", "[merged models]") {
   link.joint = "j";
   link.inertia = box_inertia(1, {1, 1, 1}, {0, 0, 0});
   builder.add(link).warn("a grain of salt");
-  const Model whole = merged({{builder.build(), "left", Pose::Identity()}, {chain(2), "right", Pose::Identity()}}, "two");
+  const Model whole = merged({{builder.build(), "left"}, {chain(2), "right"}}, "two");
   CHECK(whole.warnings == std::vector<std::string>{"left: a grain of salt"});
 }
 
 TEST_CASE("models whose names meet are not merged", "[merged models]") {
   const auto attempt = [](const std::string& a, const std::string& b) {
-    return merged({{chain(2), a, Pose::Identity()}, {chain(3), b, Pose::Identity()}}, "two");
+    return merged({{chain(2), a}, {chain(3), b}}, "two");
   };
   CHECK_THROWS_WITH(attempt("", ""), Contains("two coordinates are called \"joint1\"") && Contains("a name of its own"));
   CHECK_THROWS_AS(attempt("a", "a"), InputError);
   CHECK_NOTHROW(attempt("", "a"));
   CHECK_THROWS_AS(merged({}, "none"), InputError);
-  Pose broken = Pose::Identity();
-  broken.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  Pose broken;
+  broken.shift[0] = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH(merged({{chain(2), "a", broken}}, "one"), Contains("not finite"));
 }
 
@@ -206,20 +207,20 @@ TEST_CASE("a model that hangs from a link of another is as if it had been built 
   rope.add(link_of("clamp", "", JointType::fixed, 2, {0, 0, 0.1}));
   rope.add(link_of("first", "clamp", JointType::ball, 0.3, {0, 0, -0.1}));
   rope.add(link_of("second", "first", JointType::revolute, 0.2, {0, 0, -0.3}));
-  Pose pose = placed(0.2, -0.1, 0.7);
+  const Pose pose = placed(0.2, -0.1, 0.7);
   for (LinkSpec link : {link_of("crane/mast", "", JointType::fixed, 50, {0, 0, 1}), link_of("crane/boom", "crane/mast", JointType::revolute, 9, {0.1, 0, 2}),
                         link_of("crane/hook", "crane/boom", JointType::fixed, 1, {3, 0, 0.2})}) {
     whole.add(link);
   }
   LinkSpec clamp = link_of("rope/clamp", "crane/hook", JointType::fixed, 2, {0, 0, 0.1});
-  clamp.placement = pose * clamp.placement;
+  clamp.placement = isometry(pose) * clamp.placement;
   whole.add(clamp);
   whole.add(link_of("rope/first", "rope/clamp", JointType::ball, 0.3, {0, 0, -0.1}));
   whole.add(link_of("rope/second", "rope/first", JointType::revolute, 0.2, {0, 0, -0.3}));
   const Model expected = whole.build();
   // in either order of the list
   for (const bool rope_first : {false, true}) {
-    std::vector<PlacedModel> parts{{crane.build(), "crane", Pose::Identity()}, {rope.build(), "rope", pose, "crane/hook"}};
+    std::vector<PlacedModel> parts{{crane.build(), "crane"}, {rope.build(), "rope", pose, "crane/hook"}};
     if (rope_first) std::swap(parts[0], parts[1]);
     const Model found = merged(parts, "whole");
     REQUIRE(found.tree.shape.slots == expected.tree.shape.slots);
@@ -236,14 +237,14 @@ TEST_CASE("a model that hangs from a link of another is as if it had been built 
       INFO(link);
       REQUIRE(found.names.link.contains(link));
       CHECK(found.names.link.at(link).slot == place.slot);
-      CHECK(found.names.link.at(link).in_body.matrix().isApprox(place.in_body.matrix(), 1e-14));
+      CHECK(isometry(found.names.link.at(link).in_body).matrix().isApprox(isometry(place.in_body).matrix(), 1e-14));
     }
     REQUIRE(found.shapes.size() == expected.shapes.size());
     for (const BodyShape& shape : expected.shapes) {
       const auto same = std::ranges::find(found.shapes, shape.link, &BodyShape::link);
       REQUIRE(same != found.shapes.end());
       CHECK(same->slot == shape.slot);
-      CHECK(same->pose.matrix().isApprox(shape.pose.matrix(), 1e-14));
+      CHECK(isometry(same->pose).matrix().isApprox(isometry(shape.pose).matrix(), 1e-14));
     }
   }
 }
@@ -257,7 +258,7 @@ TEST_CASE("models hang from one another in a row, from what is fixed to the worl
   CHECK(row.tree.levels() - 1 == 5);  // a: 2, b below its first, c below that one's second
   TreeBuilder post("post");
   post.add(link_of("top", "", JointType::fixed, 5, {1, 2, 3})).add(link_of("arm", "top", JointType::revolute, 1, {0, 0, 0}));
-  const Model stands = merged({{post.build(), "post", placed(0, 0, 0)}, {generate("chain:2"), "rope", Pose::Identity(), "post/top"}}, "stands");
+  const Model stands = merged({{post.build(), "post", placed(0, 0, 0)}, {generate("chain:2"), "rope", Pose{}, "post/top"}}, "stands");
   const auto rope = static_cast<Index>(std::ranges::find(stands.names.body, "rope/link1") - stands.names.body.begin());
   CHECK(stands.tree.parent(rope) == 0);
   CHECK(placement(stands, rope).translation().isApprox(Eigen::Vector3d(1, 2, 3.3)));
@@ -272,6 +273,6 @@ TEST_CASE("models hang from one another in a row, from what is fixed to the worl
   CHECK_THAT(message({part("a", "b/link1"), part("b", "a/link1")}), Contains("model \"a\" hangs from \"b/link1\": it hangs from itself"));
   CHECK_THAT(message({part("a", "a/link1")}), Contains("it hangs from itself"));
   CHECK_THAT(message({part("a", ""), part("b", "a/lnk1")}), Contains("there is no link \"a/lnk1\"") && Contains("did you mean \"a/link1\"?"));
-  PlacedModel floating{load_urdf(kHumanoid, Base::floating), "h", Pose::Identity(), "a/link1"};
+  PlacedModel floating{load_urdf(kHumanoid, Base::floating), "h", Pose{}, "a/link1"};
   CHECK_THAT(message({part("a", ""), floating}), Contains("its base floats"));
 }

@@ -33,7 +33,7 @@ LinkSpec hinge(const std::string& name, const std::string& parent, double mass, 
   link.name = name + "_link";
   link.joint = name;
   link.parent = parent.empty() ? "" : parent + "_link";
-  link.placement = Pose(Eigen::Translation3d(at));
+  link.placement = Isometry(Eigen::Translation3d(at));
   if (mass > 0) link.inertia = sphere_inertia(mass, 0.05, {0.2, 0, 0});
   link.mimic = tie.leader;
   link.multiplier = tie.multiplier;

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-LinkShape shape(ShapeKind kind, const std::array<double, 3>& size, const Pose& pose = Pose::Identity(), const std::string& mesh = "") {
+LinkShape shape(ShapeKind kind, const std::array<double, 3>& size, const Pose& pose = {}, const std::string& mesh = "") {
   return {pose, {kind, size, mesh}};
 }
 
@@ -163,10 +163,10 @@ TEST_CASE("a capsule has the mass and the moments of its discs") {
 }
 
 TEST_CASE("a shape that is turned and moved keeps its moments, turned with it") {
-  Pose pose = Pose::Identity();
+  Isometry pose = Isometry::Identity();
   pose.linear() = Eigen::AngleAxisd(kPi / 2, Vector3d::UnitX()).toRotationMatrix();  // y to z, z to -y
   pose.translation() = Vector3d(1, 2, 3);
-  require_inertia(shape_inertia(shape(ShapeKind::box, {2, 3, 4}, pose), 100), 2400, {1, 2, 3}, Vector3d(5000, 2600, 4000).asDiagonal());
+  require_inertia(shape_inertia(shape(ShapeKind::box, {2, 3, 4}, pose_of(pose)), 100), 2400, {1, 2, 3}, Vector3d(5000, 2600, 4000).asDiagonal());
 }
 
 TEST_CASE("the solid that a mesh encloses has the moments of its closed form, in every kind of file") {

@@ -18,7 +18,7 @@ std::vector<Model> large_trees() {
   models.push_back(humanoids(100));
   models.push_back(balanced_tree(1 + 3 * kBranch, 3 * kBranch));
   const Model part = humanoids(30);
-  models.push_back(merged({{part, "a", Pose::Identity()}, {part, "b", Pose::Identity()}}, "two crowds"));
+  models.push_back(merged({{part, "a"}, {part, "b"}}, "two crowds"));
   return models;
 }
 

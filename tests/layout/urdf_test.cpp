@@ -16,6 +16,8 @@
 #include <map>
 #include <thread>
 
+#include "models/build/builder.hpp"
+#include "models/build/isometry.hpp"
 #include "tests/layout/robots.hpp"
 #include "tests/reference/urdf_plain.hpp"
 
@@ -161,7 +163,7 @@ TEST_CASE("every link of every robot stands where its XML places it, and every j
         CAPTURE(file, static_cast<int>(base), name);
         const LinkPlace& place = model.names.link.at(name);
         const Eigen::Matrix4d expected = plain.pose(name);
-        REQUIRE((body_pose(model, place.slot) * place.in_body.matrix() - expected).norm() < 1e-12);
+        REQUIRE((body_pose(model, place.slot) * isometry(place.in_body).matrix() - expected).norm() < 1e-12);
         if (link.type != "revolute" && link.type != "continuous" && link.type != "prismatic") continue;
         const Index slot = model.names.slot_of_joint.at(link.joint);
         REQUIRE(slot == place.slot);
