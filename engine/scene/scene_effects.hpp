@@ -18,7 +18,7 @@
 // A servo acts on every screw joint; on those that `joints` names where it is a list, or a map without a `stiffness` beside it. Targets
 // are the positions at the start where none are given; a target that moves has no velocity but the one given for it. Limits of velocity
 // are none but those that are named: `limits: urdf` means positions.
-// Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo, torque and motion refuse it.
+// Mimic joints: armature, damping, friction and limits of a follower act on its leader; springs, servo, torque and motion refuse it.
 // Free joints have none of these, ball joints damping and spring only. A link that is merged into another's body acts there.
 // CSV files are found relative to the scene: time,value a line for torque, servo, motion
 // (also time,position,velocity) and wrench (there a share of force and moment).
