@@ -20,6 +20,7 @@
 #include "layout/effects/armature.hpp"
 #include "layout/effects/ball_spring.hpp"
 #include "layout/effects/damping.hpp"
+#include "layout/effects/dead_zone_spring.hpp"
 #include "layout/effects/drag.hpp"
 #include "layout/effects/friction.hpp"
 #include "layout/effects/ground.hpp"
@@ -41,6 +42,7 @@ struct Model;
   LIST(std::vector<Armature>, armature)                \
   LIST(std::vector<JointSpring>, springs)              \
   LIST(std::vector<BallSpring>, ball_springs)          \
+  LIST(std::vector<DeadZoneSpring>, dead_zone_springs) \
   LIST(std::vector<JointDamping>, damping)             \
   LIST(std::vector<JointFriction>, friction)           \
   LIST(std::vector<JointLimit>, limits)                \

@@ -15,6 +15,7 @@
 #include "kernels/effects/armature.hpp"
 #include "kernels/effects/ball_spring.hpp"
 #include "kernels/effects/damping.hpp"
+#include "kernels/effects/dead_zone_spring.hpp"
 #include "kernels/effects/drag.hpp"
 #include "kernels/effects/friction.hpp"
 #include "kernels/effects/given_motion.hpp"
@@ -31,6 +32,7 @@ template <class S>
 using JointLaws = std::tuple<ArmatureLaw<S>,
                              SpringLaw<S>,
                              BallSpringLaw<S>,
+                             DeadZoneSpringLaw<S>,
                              DampingLaw<S>,
                              TorqueLaw<S>,
                              ServoLaw<S>,
