@@ -103,7 +103,8 @@ void Baseline::drive(double time, const Field<double>& v) {
   });
 }
 
-static_assert(kBodyLaws == 3, "Baseline::push_bodies knows wrenches and drag, and a ground is refused: say there what another law of bodies does");
+static_assert(kBodyLaws == 3,
+              "Baseline::push_bodies knows wrenches and drag, and a ground is refused: say there what another law of bodies does");
 
 void Baseline::push_bodies(double time) {
   world_placement_down(model_->tree, work_.placement, pose_);

@@ -91,7 +91,9 @@ std::optional<OwnersDifference> first_difference(std::string_view saved, std::st
       const auto before = owners_in(then, line.kind), after = owners_in(now, line.kind);
       if (before == after) continue;
       const auto only_before = without(before, after), only_after = without(after, before);
-      if (only_before.empty() && only_after.empty()) return OwnersDifference{text_of(line.kind, before, false), text_of(line.kind, after, false) + ", in another order"};
+      if (only_before.empty() && only_after.empty()) {
+        return OwnersDifference{text_of(line.kind, before, false), text_of(line.kind, after, false) + ", in another order"};
+      }
       const bool some = only_before.size() < before.size();  // that both have
       return OwnersDifference{text_of(line.kind, only_before, some), text_of(line.kind, only_after, some)};
     }

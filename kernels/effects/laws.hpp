@@ -66,7 +66,9 @@ struct LawFor<Entry, std::tuple<First, Others...>>
 /// Laws of a scene, each built where it stands.
 template <class Laws>
 Laws laws_of(const LawSetup& setup) {
-  return [&]<std::size_t... K>(std::index_sequence<K...>) { return Laws((void(K), setup)...); }(std::make_index_sequence<std::tuple_size_v<Laws>>());
+  return [&]<std::size_t... K>(std::index_sequence<K...>) {
+    return Laws((void(K), setup)...);
+  }(std::make_index_sequence<std::tuple_size_v<Laws>>());
 }
 
 /// visit.operator()<Law>() of every law of a list, in order.
@@ -95,7 +97,8 @@ struct NoBook {
 template <class Law, class S>
 consteval void require_parts() {
   constexpr EffectFacts facts = Law::Entry::facts;
-  static_assert(kListOf<typename Law::Entry> < kEffectLists, "the law's entries have no list: name it in LINDEN_EFFECT_LISTS, layout/effects.hpp");
+  static_assert(kListOf<typename Law::Entry> < kEffectLists,
+                "the law's entries have no list: name it in LINDEN_EFFECT_LISTS, layout/effects.hpp");
   static_assert(requires { Law::sweeps.size(); }, "the law does not say what its parts are called: give it `sweeps`, as in law.hpp");
   if constexpr (facts.has_states) {
     static_assert(requires(Law& law, const StepView<S>& step, const Revision<MaskOf<S>>& now, const S& least, const Field<S>& r, Field<S>& d) {
@@ -128,7 +131,8 @@ template <class Law, class S>
 consteval void require_body_parts() {
   constexpr EffectFacts facts = Law::Entry::facts;
   static_assert(facts.site == Site::body, "a law of bodies stands in the list of joints, or its facts name the wrong site");
-  static_assert(requires(const LawSetup& setup) { Law::touching(setup).front().slot; }, "give the law `touching`, as in law.hpp: what it has on bodies");
+  static_assert(requires(const LawSetup& setup) { Law::touching(setup).front().slot; },
+                "give the law `touching`, as in law.hpp: what it has on bodies");
   if constexpr (facts.stores) {
     static_assert(requires(Law& law, const Field<S, 12>& pose) { { law.place(pose) } -> std::same_as<S>; },
                   "the facts say that the effect stores energy: give its law `place`, as in law.hpp");

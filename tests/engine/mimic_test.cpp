@@ -82,8 +82,9 @@ void check_against_twin(const Make& effects, double speed, int steps) {
             Approx(slides.multiplier * pair.positions()[static_cast<std::size_t>(leader)] + slides.offset).epsilon(0).margin(1e-15));
       worst = std::max(worst, std::abs(pair.velocities()[static_cast<std::size_t>(leader)] - twin.velocities()[0]));
       const EffectWork&a = pair.effect_work(), &b = twin.effect_work();
-      for (const double more : {pair.energy().total() - twin.energy().total(), a.of<JointDamping>() - b.of<JointDamping>(), a.of<JointFriction>() - b.of<JointFriction>(),
-                                a.of<JointLimit>() - b.of<JointLimit>(), a.of<Servo>() - b.of<Servo>(), a.of<JointTorque>() - b.of<JointTorque>()}) {
+      for (const double more : {pair.energy().total() - twin.energy().total(), a.of<JointDamping>() - b.of<JointDamping>(),
+                                a.of<JointFriction>() - b.of<JointFriction>(), a.of<JointLimit>() - b.of<JointLimit>(),
+                                a.of<Servo>() - b.of<Servo>(), a.of<JointTorque>() - b.of<JointTorque>()}) {
         worst = std::max(worst, std::abs(more) / slides.inertia());
       }
     }
