@@ -143,11 +143,10 @@ void Simulation::load(const std::string& file) {
   read_to(body);
   if (bytes.size() < body) throw InputError(fmt::format("{}: the checkpoint is cut short", file));
   const std::string_view saved = std::string_view(bytes).substr(text);
-  if (const std::string here = effect_owners(*plan_, model_->names); saved != here) {
-    const OwnersDifference other = first_difference(saved, here);
+  if (const auto other = first_difference(saved, effect_owners(*plan_, model_->names))) {
     throw InputError(fmt::format("{}: this checkpoint was saved with {}, the simulation has {}, so it would not continue the same run; load it "
                                  "with the effects that it was saved with (their numbers may be others)",
-                                 file, other.saved, other.here));
+                                 file, other->saved, other->here));
   }
   const std::vector<std::span<double>> memory = stepper_->memory();
   if (header.kept != count_of(memory)) {

@@ -1,7 +1,7 @@
 // layout/effects.hpp
 // What acts on the bodies and joints of a scene beside gravity, as plain values: one list an effect, an empty list where the scene has
-// none of it. Rows are velocity rows of screw joints, slots bodies; model.names says which is which. kernels/effects/ has a file for
-// each with its equation, its energy and its cost.
+// none of it. Rows are velocity rows of screw joints, slots bodies; model.names says which is which. Each kind of entry stands with its facts
+// in a file of its own, layout/effects/, and its equation, energy and cost in the file of that name in kernels/effects/.
 //
 //   Effects effects;
 //   effects.damping = urdf_damping(model);
@@ -11,153 +11,105 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <optional>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
-#include "layout/contacts.hpp"
-#include "layout/field.hpp"
+#include "layout/effects/armature.hpp"
+#include "layout/effects/ball_spring.hpp"
+#include "layout/effects/damping.hpp"
+#include "layout/effects/dead_zone_spring.hpp"
+#include "layout/effects/drag.hpp"
+#include "layout/effects/friction.hpp"
+#include "layout/effects/ground.hpp"
+#include "layout/effects/limits.hpp"
+#include "layout/effects/motion.hpp"
+#include "layout/effects/on_rows.hpp"
+#include "layout/effects/servo.hpp"
+#include "layout/effects/spring.hpp"
+#include "layout/effects/torque.hpp"
+#include "layout/effects/wrench.hpp"
 #include "layout/names.hpp"
 
 namespace linden {
 
 struct Model;
 
-/// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend; where
-/// two are equal the number jumps.
-struct Course {
-  std::vector<double> times{0};
-  std::vector<double> values{0};
-  double at(double time) const;
-  /// Mean over [begin, end], exactly. What lies at one of its ends but for the rounding of times lies there: a jump at 0.3 s is that of
-  /// the step from 3 x 0.1 s on.
-  double mean(double begin, double end) const;
-};
+/// Every effect, in the order in which checks, reports and accounts have them.
+#define LINDEN_EFFECT_LISTS(LIST)                      \
+  LIST(std::vector<Armature>, armature)                \
+  LIST(std::vector<JointSpring>, springs)              \
+  LIST(std::vector<BallSpring>, ball_springs)          \
+  LIST(std::vector<DeadZoneSpring>, dead_zone_springs) \
+  LIST(std::vector<JointDamping>, damping)             \
+  LIST(std::vector<JointFriction>, friction)           \
+  LIST(std::vector<JointLimit>, limits)                \
+  LIST(std::vector<Servo>, servos)                     \
+  LIST(std::vector<JointTorque>, torques)              \
+  LIST(std::vector<JointMotion>, motions)              \
+  LIST(std::vector<BodyWrench>, wrenches)              \
+  LIST(std::vector<Drag>, drag)                        \
+  LIST(std::optional<Ground>, ground)
 
-/// Inertia of a rotor that a joint turns along.
-struct Armature {
-  Index row;
-  double inertia;  // [kg m^2, kg]
-};
-
-struct JointSpring {
-  Index row;
-  double stiffness;  // [N m/rad, N/m]
-  double rest = 0;   // [rad, m]
-};
-
-/// Pulls a ball joint towards an orientation by an angle's worth of torque.
-struct BallSpring {
-  Index slot;
-  double stiffness;                        // [N m/rad]
-  std::array<double, 4> rest{0, 0, 0, 1};  // unit quaternion x y z w
-};
-
-struct JointDamping {
-  Index row;           // of a screw, or any row of a ball joint
-  double coefficient;  // [N m s/rad, N s/m]
-};
-
-/// Coulomb friction: holds the joint still below it, opposes its motion by it.
-struct JointFriction {
-  Index row;
-  double force;  // [N m, N]
-};
-
-struct JointLimit {
-  Index row;
-  double lower = -std::numeric_limits<double>::infinity();  // [rad, m]
-  double upper = std::numeric_limits<double>::infinity();
-  double restitution = 0;  // 0: stops, 1: bounces back at the same speed
-  double velocity = std::numeric_limits<double>::infinity();  // at most, either way [rad/s, m/s]
-};
-
-/// A force of stiffness (target - q) + damping (target_velocity - qdot) + feedforward on a joint, at most max_force in all.
-struct Servo {
-  Index row;
-  double stiffness;    // [N m/rad, N/m]
-  double damping = 0;  // [N m s/rad, N s/m]
-  double target = 0;   // [rad, m]
-  double max_force = std::numeric_limits<double>::infinity();  // [N m, N]
-  Course target_over_time{{}, {}};  // [rad, m]; goes over target where it has any points
-  Course target_velocity{};         // [rad/s, m/s]; that of a moving target is not taken from it
-  Course feedforward{};             // [N m, N]
-
-  bool target_moves() const;
-  double target_at(double time) const;
-};
-
-struct JointTorque {
-  Index row;
-  Course force;  // [N m, N]
-};
-
-/// Moves a joint as given, along the smooth curve through the points (layout/smooth_curve.hpp), with whatever force that takes. It has
-/// neither friction nor limits of its own.
-struct JointMotion {
-  Index row;
-  Course position;                  // [rad, m]; no two times are equal
-  std::vector<double> velocities{};  // at those points [rad/s, m/s]; none: the curve's own, which never overshoots
-};
-
-/// A wrench on a body.
-struct BodyWrench {
-  Index slot;
-  std::array<double, 3> point{};   // where the force acts, body frame [m]
-  std::array<double, 3> force{};   // [N]
-  std::array<double, 3> moment{};  // [N m]
-  bool in_world = true;            // directions of force and moment: the world's, or the body's
-  double from = -std::numeric_limits<double>::infinity();  // [s]
-  double to = std::numeric_limits<double>::infinity();
-  Course scale{{0}, {1}};          // force and moment over time, as shares of the above
-  double share_at(double time) const;
-  /// Mean of what acts over [begin, end], exactly; ends are as those of Course::mean.
-  double mean_share(double begin, double end) const;
-};
-
-/// -(linear + quadratic |v|) v at the centre of mass, v relative to the wind.
-struct Drag {
-  Index slot;
-  double linear = 0;     // [N s/m]
-  double quadratic = 0;  // [N s^2/m^2]
-};
-
-/// Heights over the ground's plane on a grid, two triangles a cell: (0,0) (1,0) (0,1) and (1,1) (0,1) (1,0). Beyond an edge of the map its
-/// last row or column goes on for ever: the height is that of the nearest point of the map, and the ground's normal is that of these heights,
-/// level across the edge; beyond a corner all is level.
-struct HeightField {
-  Index columns, rows;           // along x, along y of the plane; 2 or more each
-  double spacing_x, spacing_y;   // [m]
-  double origin_x, origin_y;     // of heights[0], in the plane's frame [m]
-  std::vector<double> heights;   // [rows x columns], row by row [m]
-};
-
-struct Ground {
-  std::array<double, 3> normal{0, 0, 1};  // unit length, world frame
-  double height = 0;                      // of the plane along its normal [m]
-  double stiffness = 1e5;                 // of one contact point [N/m]
-  double damping = 0;                     // of one contact point along the normal [N s/m]
-  double friction = 0.8;                  // Coulomb's coefficient
-  std::optional<HeightField> terrain{};
-  Contacts contacts{};
-};
+/// Entries of a list, none or one of what there is once.
+template <class Entry>
+std::span<const Entry> entries_in(const std::vector<Entry>& list) {
+  return list;
+}
+template <class Entry>
+std::span<const Entry> entries_in(const std::optional<Entry>& list) {
+  return list ? std::span<const Entry>(&*list, 1) : std::span<const Entry>();
+}
 
 struct Effects {
-  std::vector<Armature> armature;
-  std::vector<JointSpring> springs;
-  std::vector<BallSpring> ball_springs;
-  std::vector<JointDamping> damping;
-  std::vector<JointFriction> friction;
-  std::vector<JointLimit> limits;
-  std::vector<Servo> servos;
-  std::vector<JointTorque> torques;
-  std::vector<JointMotion> motions;
-  std::vector<BodyWrench> wrenches;
-  std::vector<Drag> drag;
-  std::array<double, 3> wind{0, 0, 0};  // [m/s], world frame
-  std::optional<Ground> ground;
+#define LINDEN_LIST(type, name) type name;
+  LINDEN_EFFECT_LISTS(LINDEN_LIST)
+#undef LINDEN_LIST
+  std::array<double, 3> wind{0, 0, 0};  // of drag [m/s], world frame
+
+  /// The list whose entries are of this kind.
+  template <class Entry>
+  const auto& list() const {
+#define LINDEN_LIST(type, name) \
+  if constexpr (std::is_same_v<type::value_type, Entry>) return name;
+    LINDEN_EFFECT_LISTS(LINDEN_LIST)
+#undef LINDEN_LIST
+  }
+  template <class Entry>
+  auto& list() {
+#define LINDEN_LIST(type, name) \
+  if constexpr (std::is_same_v<type::value_type, Entry>) return name;
+    LINDEN_EFFECT_LISTS(LINDEN_LIST)
+#undef LINDEN_LIST
+  }
+  /// visit(entries, name of their list) of every effect.
+  template <class Visit>
+  static void each(const Effects& effects, const Visit& visit) {
+#define LINDEN_LIST(type, name) visit(entries_in(effects.name), #name);
+    LINDEN_EFFECT_LISTS(LINDEN_LIST)
+#undef LINDEN_LIST
+  }
 };
+
+/// Facts of every effect, list by list.
+inline constexpr std::array kEffectFacts{
+#define LINDEN_LIST(type, name) &type::value_type::facts,
+    LINDEN_EFFECT_LISTS(LINDEN_LIST)
+#undef LINDEN_LIST
+};
+inline constexpr std::size_t kEffectLists = kEffectFacts.size();
+inline constexpr std::size_t kBodyEffects = static_cast<std::size_t>(
+    std::ranges::count(kEffectFacts, Site::body, [](const EffectFacts* facts) { return facts->site; }));
+
+/// Place of an entry's list among them.
+template <class Entry>
+inline constexpr std::size_t kListOf = [] {
+  std::size_t place = 0;
+  while (kEffectFacts[place] != &Entry::facts) ++place;
+  return place;
+}();
 
 /// First velocity row of a joint. Throws InputError, with the nearest name, where no such joint moves.
 Index row_of(const Model& model, const std::string& joint);
@@ -182,13 +134,9 @@ std::vector<JointLimit> velocity_limit_everywhere(const Model& model, double vel
 std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double damping,
                                     const std::vector<double>& positions = {});
 
-/// Carries what stands on followers' rows to their leaders' (q_f = m q + o): inertia and damping times m^2, friction times |m|,
-/// limits through the map, velocities by |m|, the tighter ones and the smaller restitution where several meet. One entry a row is left,
-/// sorted by row.
+/// Carries what stands on followers' rows to their leaders' (layout/effects/on_rows.hpp has it for armature, damping and friction): limits through
+/// the map, velocities by |m|, the tighter ones and the smaller restitution where several meet. One entry a row is left, sorted by row.
 /// Throws InputError where limits leave no room.
-std::vector<Armature> on_leaders(const Model& model, const std::vector<Armature>& list);
-std::vector<JointDamping> on_leaders(const Model& model, const std::vector<JointDamping>& list);
-std::vector<JointFriction> on_leaders(const Model& model, const std::vector<JointFriction>& list);
 std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLimit>& list);
 
 /// Whether one takes momentum out of the system or brings it in: wrenches, drag, ground.

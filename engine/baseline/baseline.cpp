@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <string_view>
 
 #include "engine/compose/composition.hpp"
 #include "engine/effects/effect_plan.hpp"
 #include "engine/solve/instance_stepper.hpp"
-#include "kernels/effects/armature.hpp"
-#include "kernels/effects/ball_spring.hpp"
+#include "kernels/effects/laws.hpp"
 #include "kernels/tree/advance_map.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/gravity.hpp"
@@ -86,29 +87,28 @@ void Baseline::place() {
   } else {
     std::ranges::fill(work_.force.flat(), 0.0);
   }
-  for (const JointSpring& spring : plan_->effects.springs) {
-    const double stretch = q_(plan_->q_row(spring.row)) - spring.rest;
-    work_.force(spring.row) -= spring.stiffness * stretch;
-    potential_ += 0.5 * spring.stiffness * stretch * stretch;
-  }
-  for (const BallSpring& spring : plan_->effects.ball_springs) {
-    const Index from = tree.first_q(spring.slot), row = tree.first_v(spring.slot);
-    const Vec3<double> turn =
-        shorter_turn(rest_inverse<double>(spring) * Quaternion<double>{load3<double>(q_, from), q_(from + 3)});
-    store3(work_.force, row, load3<double>(work_.force, row) - spring.stiffness * turn);
-    potential_ += 0.5 * spring.stiffness * dot(turn, turn);
-  }
+  const JointsView<double> at{q_, plan_->q_row, tree};
+  Effects::each(plan_->effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if constexpr (Entry::facts.site == Site::joint && Entry::facts.stores) {
+      for (const Entry& entry : entries) potential_ += LawFor<Entry, JointLaws<double>>::type::potential(entry, at);
+    }
+  });
 }
 
 void Baseline::drive(double time, const Field<double>& v) {
-  const Effects& effects = plan_->effects;
-  for (const JointDamping& damper : effects.damping) work_.force(damper.row) -= damper.coefficient * v(damper.row);
-  for (const Servo& servo : effects.servos) {
-    work_.force(servo.row) += servo.stiffness * (servo.target_at(time) - q_(plan_->q_row(servo.row))) +
-                              servo.damping * (servo.target_velocity.at(time) - v(servo.row)) + servo.feedforward.at(time);
-  }
-  for (const JointTorque& torque : effects.torques) work_.force(torque.row) += torque.force.at(time);
+  const Instant now{time, q_, v, plan_->q_row, model_->tree};
+  Effects::each(plan_->effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if constexpr (Entry::facts.site == Site::joint) {
+      using Law = typename LawFor<Entry, JointLaws<double>>::type;
+      if constexpr (requires(const Entry& entry) { Law::push(entry, now, work_.force); }) {
+        for (const Entry& entry : entries) Law::push(entry, now, work_.force);
+      }
+    }
+  });
 }
+
+static_assert(kBodyLaws == 3,
+              "Baseline::push_bodies knows wrenches and drag, and a ground is refused: say there what another law of bodies does");
 
 void Baseline::push_bodies(double time) {
   world_placement_down(model_->tree, work_.placement, pose_);

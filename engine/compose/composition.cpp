@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -44,30 +44,18 @@ std::span<const double> composition(int order) {
 
 std::string irreversible(const Effects& effects) {
   std::vector<std::string_view> refused;
-  const auto refuse = [&](bool there, std::string_view name) {
-    if (there) refused.push_back(name);
-  };
-  refuse(!effects.damping.empty(), "damping");
-  refuse(!effects.friction.empty(), "friction");
-  refuse(!effects.limits.empty(), "limits");
-  refuse(!effects.servos.empty(), "servo");
-  refuse(!effects.torques.empty(), "torque");
-  refuse(!effects.motions.empty(), "motion");
-  refuse(!effects.wrenches.empty(), "wrench");
-  refuse(!effects.drag.empty(), "drag");
-  refuse(effects.ground.has_value(), "ground");
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if (Entry::facts.account != Account::none && !entries.empty()) refused.push_back(Entry::facts.name);
+  });
   return fmt::format("{}", fmt::join(refused, ", "));
 }
 
 std::string sudden(const Effects& effects) {
   std::vector<std::string_view> found;
-  if (!effects.friction.empty()) found.push_back("friction");
-  if (!effects.limits.empty()) found.push_back("limits");
-  if (std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); })) {
-    found.push_back("servo with limited force");
-  }
-  if (!effects.motions.empty()) found.push_back("motion");
-  if (effects.ground) found.push_back("ground");
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    const auto is_sudden = [](const Entry& entry) { return settles(entry) || !Entry::facts.has_states; };
+    if (!Entry::facts.sudden.empty() && std::ranges::any_of(entries, is_sudden)) found.push_back(Entry::facts.sudden);
+  });
   return fmt::format("{}", fmt::join(found, ", "));
 }
 

@@ -41,11 +41,11 @@ struct Effects;
 /// gamma_1, ..., gamma_s. Throws InputError for an order that is none of 2, 4, 6, 8.
 std::span<const double> composition(int order);
 
-/// The effects of a scene that cannot be taken back in time, by name, with commas: all but armature and springs. Empty: none.
+/// The effects of a scene that cannot be taken back in time, by name, with commas: all that take or give energy. Empty: none.
 std::string irreversible(const Effects& effects);
 
-/// Those of them whose force changes suddenly with the motion, so that no explicit method has them: friction, limits, servos with limited
-/// force, ground.
+/// Those whose force changes suddenly with the motion, so that no explicit method has them, as their facts say: friction, limits, servos with
+/// limited force, given motions, ground.
 std::string sudden(const Effects& effects);
 
 /// Throws InputError where the order is above 2 and an effect cannot be taken back in time.

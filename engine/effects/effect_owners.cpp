@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
+#include <type_traits>
 #include <vector>
 
 #include "engine/effects/effect_plan.hpp"
@@ -56,32 +58,31 @@ std::string text_of(std::string_view kind, const std::vector<std::string_view>& 
 }  // namespace
 
 std::string effect_owners(const EffectPlan& plan, const Names& names) {
-  const Effects& effects = plan.effects;
   std::string text;
-  const auto add = [&](const char* kind, const auto& entries, const auto& owner) {
+  const auto owner = [&](const auto& entry) -> const std::string& {
+    if constexpr (requires { entry.row; }) {
+      return names.velocity[static_cast<std::size_t>(entry.row)];
+    } else {
+      return names.body[static_cast<std::size_t>(entry.slot)];
+    }
+  };
+  const auto add = [&](std::string_view kind, const auto& entries) {
     if (entries.empty()) return;
     text += kind;
     for (const auto& entry : entries) text.append(1, '\0').append(owner(entry));
     text += '\n';
   };
-  const auto joint = [&](const auto& entry) { return names.velocity[static_cast<std::size_t>(entry.row)]; };
-  const auto body = [&](const auto& entry) { return names.body[static_cast<std::size_t>(entry.slot)]; };
-  add("armature", effects.armature, joint);
-  add("springs", effects.springs, joint);
-  add("springs of ball joints", effects.ball_springs, body);
-  add("damping", effects.damping, joint);
-  add("friction", effects.friction, joint);
-  add("limits", effects.limits, joint);
-  add("servos", effects.servos, joint);
-  add("given motions", effects.motions, joint);
-  add("torques", effects.torques, joint);
-  add("wrenches", effects.wrenches, body);
-  add("drag", effects.drag, body);
-  add(plan.ground.ground.terrain ? "points of a terrain" : "points of a ground", plan.ground.points, body);
+  Effects::each(plan.effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if constexpr (std::is_same_v<Entry, Ground>) {
+      add(plan.ground.ground.terrain ? "points of a terrain" : Entry::facts.owners, plan.ground.points);
+    } else {
+      add(Entry::facts.owners, entries);
+    }
+  });
   return text;
 }
 
-OwnersDifference first_difference(std::string_view saved, std::string_view here) {
+std::optional<OwnersDifference> first_difference(std::string_view saved, std::string_view here) {
   const std::vector<Line> then = lines_of(saved), now = lines_of(here);
   const auto owners_in = [](const std::vector<Line>& lines, std::string_view kind) {
     const auto line = std::ranges::find(lines, kind, &Line::kind);
@@ -92,12 +93,14 @@ OwnersDifference first_difference(std::string_view saved, std::string_view here)
       const auto before = owners_in(then, line.kind), after = owners_in(now, line.kind);
       if (before == after) continue;
       const auto only_before = without(before, after), only_after = without(after, before);
-      if (only_before.empty() && only_after.empty()) return {text_of(line.kind, before, false), text_of(line.kind, after, false) + ", in another order"};
+      if (only_before.empty() && only_after.empty()) {
+        return OwnersDifference{text_of(line.kind, before, false), text_of(line.kind, after, false) + ", in another order"};
+      }
       const bool some = only_before.size() < before.size();  // that both have
-      return {text_of(line.kind, only_before, some), text_of(line.kind, only_after, some)};
+      return OwnersDifference{text_of(line.kind, only_before, some), text_of(line.kind, only_after, some)};
     }
   }
-  return {"effects in another order", "the same"};
+  return std::nullopt;
 }
 
 }  // namespace linden

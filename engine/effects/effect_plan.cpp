@@ -5,7 +5,7 @@
 #include <map>
 
 #include "engine/effects/stiff_contact.hpp"
-#include "kernels/effects/joint_impulses.hpp"
+#include "kernels/effects/laws.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/increment_down.hpp"
 #include "kernels/tree/mimic.hpp"
@@ -129,93 +129,103 @@ std::optional<StiffContact> stiffest_unresolved(const Model& model, const Option
   return StiffContact{model.names.body[static_cast<std::size_t>(stiffest)], struck_mass(model, stiffest)};
 }
 
-EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given) {
+EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects& given) : effects(given), step_(options.step) {
   check(effects, model);
-  const double h = options.step;
   const Tree& tree = model.tree;
   std::ranges::stable_sort(effects.drag, {}, &Drag::slot);
   std::ranges::stable_sort(effects.wrenches, {}, &BodyWrench::slot);
-  if (effects.ground) {
-    ground.ground = *effects.ground;
-    ground.points = points_of(*effects.ground);
-    if (const auto& terrain = effects.ground->terrain) ground.highest = std::ranges::max(terrain->heights);
-  }
-  const std::vector<GroundPoint>& points = ground.points;
-
-  bodies = !effects.drag.empty() || !effects.wrenches.empty() || !points.empty();
-  joints = !effects.armature.empty() || !effects.springs.empty() || !effects.ball_springs.empty() || !effects.damping.empty() ||
-           !effects.friction.empty() || !effects.limits.empty() || !effects.servos.empty() || !effects.torques.empty() || !effects.motions.empty();
   for (const JointMotion& motion : effects.motions) curves.emplace_back(motion.position, motion.velocities);
-  springs = !effects.springs.empty() || !effects.ball_springs.empty() || !points.empty();
-  balls = !effects.ball_springs.empty() || std::ranges::any_of(effects.damping, [&](const JointDamping& damper) {
-    return std::ranges::none_of(tree.runs, [&](const Run& run) {
-      return run.kind == JointKind::screw && damper.row >= tree.first_v(run.begin) && damper.row <= tree.first_v(run.end - 1);
-    });
-  });
+  each_law_type<JointLaws<double>>([&]<class Law>() { joints = joints || !effects.list<typename Law::Entry>().empty(); });
+  if (joints) place_joints(model);
+  each_law_type<BodyLaws<double>>([&]<class Law>() { bodies = bodies || !entries_of<typename Law::Entry>(effects).empty(); });
+  for (Index slot = 0; bodies && slot < tree.shape.slots; ++slot) mass.push_back(slot == 0 ? 0 : moved_mass(model, slot));
+  if (effects.ground) place_ground(model, options);
+  const LawSetup known = setup(tree);
+  sort_bodies(known);
+  bodies = !touched.empty();
+  follow_laws(known);
   bounces = std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return limit.restitution > 0; });
-  revises = !effects.friction.empty() || !effects.limits.empty() || !points.empty() ||
-            std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
-
-  const auto moves = [](const Course& course) { return std::ranges::any_of(course.values, [](double value) { return value != 0; }); };
-  servos_move = std::ranges::any_of(effects.servos, [&](const Servo& servo) {
-    return servo.target_moves() || moves(servo.target_velocity) || moves(servo.feedforward);
-  });
   if (std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return std::isfinite(limit.velocity); })) {
     fastest.allocate(tree.shape.velocities, std::numeric_limits<double>::infinity());
     for (const JointLimit& limit : effects.limits) fastest(limit.row) = limit.velocity;
-  }
-
-  if (joints) {
-    q_row.allocate(tree.shape.velocities, -1);
-    for (Index i = 1; i < tree.shape.slots; ++i) {
-      if (tree.kind(i) == JointKind::screw) q_row(tree.first_v(i)) = tree.first_q(i);
-    }
   }
   if (!effects.armature.empty()) {
     rotor.allocate(tree.shape.velocities);
     for (const Armature& one : effects.armature) rotor(one.row) += one.inertia;
   }
-  if (!effects.damping.empty() || !effects.servos.empty()) {
-    const std::vector<double> felt = felt_inertia(model, effects.armature);
-    const auto inertia = [&](Index row) { return felt[static_cast<std::size_t>(row)]; };
-    for (const JointDamping& damper : effects.damping) damping_share.push_back(begin_share(h * damper.coefficient / inertia(damper.row)));
-    for (const Servo& servo : effects.servos) {
-      servo_ratio.push_back((h * servo.damping + h * h * servo.stiffness) / inertia(servo.row));
-      servo_share.push_back(begin_share(servo_ratio.back()));
-    }
-  }
-  const auto mass = [&](Index slot) { return moved_mass(model, slot); };
-  for (const Drag& one : effects.drag) {
-    // a falling body reaches sqrt(m g / b2) at most
-    drag_share.push_back(begin_share(h * (one.linear / mass(one.slot) + std::sqrt(one.quadratic * kUsualGravity / mass(one.slot)))));
-  }
-  if (!points.empty()) {
-    const auto& g = options.gravity;
-    const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    ground.frame = plane_frame(effects.ground->normal);
-    ground.recovery = h * kRecovery;
-    ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
-    for (const GroundPoint& point : points) ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass(point.slot)));
-  }
+}
 
-  bends = revises;
-  for (const std::vector<double>* shares : {&damping_share, &servo_share, &drag_share}) {
-    bends = bends || std::ranges::any_of(*shares, [](double share) { return share > 0.5; });
+void EffectPlan::place_joints(const Model& model) {
+  const Tree& tree = model.tree;
+  q_row.allocate(tree.shape.velocities, -1);
+  for (Index i = 1; i < tree.shape.slots; ++i) {
+    if (tree.kind(i) == JointKind::screw) q_row(tree.first_v(i)) = tree.first_q(i);
   }
+  bool asked = false;
+  each_law_type<JointLaws<double>>([&]<class Law>() {
+    if constexpr (HasRatio<Law>) asked = asked || !effects.list<typename Law::Entry>().empty();
+  });
+  if (asked) inertia = felt_inertia(model, effects.armature);
+}
 
+void EffectPlan::place_ground(const Model& model, const Options& options) {
+  ground.ground = *effects.ground;
+  ground.points = points_of(*effects.ground);
+  if (const auto& terrain = effects.ground->terrain) ground.highest = std::ranges::max(terrain->heights);
+  if (ground.points.empty()) return;
+  const double h = step_;
+  const auto& g = options.gravity;
+  const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  ground.frame = plane_frame(effects.ground->normal);
+  ground.recovery = h * kRecovery;
+  ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
+  for (const GroundPoint& point : ground.points) {
+    ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass[static_cast<std::size_t>(point.slot)]));
+  }
+}
+
+/// What the laws of bodies touch, body by body.
+void EffectPlan::sort_bodies(const LawSetup& setup) {
   std::map<Index, TouchedBody> by_slot;
-  const auto collect = [&](const auto& list, TouchedBody::Entries TouchedBody::*entries) {
+  std::size_t place = 0;
+  each_law_type<BodyLaws<double>>([&]<class Law>() {
+    const auto list = Law::touching(setup);
     for (std::size_t k = 0; k < list.size(); ++k) {
       TouchedBody& body = by_slot[list[k].slot];
       body.slot = list[k].slot;
-      if ((body.*entries).last == 0) (body.*entries).first = k;
-      (body.*entries).last = k + 1;
+      if (body.ranges[place].last == 0) body.ranges[place].first = k;
+      body.ranges[place].last = k + 1;
+    }
+    ++place;
+  });
+  for (const auto& [slot, body] : by_slot) touched.push_back(body);
+}
+
+/// What the steppers have to know of what acts.
+void EffectPlan::follow_laws(const LawSetup& setup) {
+  const auto is_implicit = [&]<class Law>(const auto& list, const auto& moved) {
+    if constexpr (HasRatio<Law>) {
+      for (const auto& entry : list) bends = bends || begin_share(Law::ratio(entry, step_, moved(entry))) > 0.5;
     }
   };
-  collect(effects.drag, &TouchedBody::drag);
-  collect(effects.wrenches, &TouchedBody::wrenches);
-  collect(points, &TouchedBody::points);
-  for (const auto& [slot, body] : by_slot) touched.push_back(body);
+  each_law_type<BodyLaws<double>>([&]<class Law>() {
+    const auto list = Law::touching(setup);
+    if (list.empty()) return;
+    kept_ += Law::kept_numbers(setup);
+    revises = revises || Law::facts.has_states;
+    is_implicit.template operator()<Law>(list, [&](const auto& entry) { return setup.mass_of(entry.slot); });
+  });
+  each_law_type<JointLaws<double>>([&]<class Law>() {
+    const auto& list = effects.list<typename Law::Entry>();
+    if (list.empty()) return;
+    kept_ += Law::kept_numbers(setup);
+    for (const auto& entry : list) {
+      revises = revises || settles(entry);
+      balls = balls || Law::on_ball(entry, setup);
+    }
+    is_implicit.template operator()<Law>(list, [&](const auto& entry) { return setup.inertia_at(entry.row); });
+  });
+  bends = bends || revises;
 }
 
 void EffectPlan::put_positions(double time, std::span<double> q) const {

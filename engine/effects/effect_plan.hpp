@@ -5,12 +5,14 @@
 // An effect that the scene does not name has no entry here, no memory in the sweeps and no call in a step.
 #pragma once
 
+#include <array>
 #include <span>
 #include <type_traits>
 #include <vector>
 
 #include "engine/options.hpp"
 #include "kernels/effects/ground_plan.hpp"
+#include "kernels/effects/law_setup.hpp"
 #include "layout/effects.hpp"
 #include "layout/model.hpp"
 #include "layout/smooth_curve.hpp"
@@ -20,43 +22,53 @@ namespace linden {
 /// Of a velocity that is read: how far it may be from the mean one of the last step where nothing is known of how the motion bends [rad/s, m/s].
 inline constexpr double kAnyBend = 1e36;
 
-/// Entries of every effect on one body: [first, last) of its list.
+/// What the laws of bodies (kernels/effects/laws.hpp) have on one body.
 struct TouchedBody {
-  struct Entries {
-    std::size_t first = 0, last = 0;
+  struct Range {
+    std::size_t first = 0, last = 0;  // [first, last) of what the law touches
   };
   Index slot = 0;
-  Entries drag, wrenches, points;
+  std::array<Range, kBodyEffects> ranges{};  // law by law
 };
 
 struct EffectPlan {
   /// Throws InputError for effects that make no sense for the model.
   EffectPlan(const Model& model, const Options& options, const Effects& effects);
 
-  Effects effects;
+  Effects effects;       // of bodies sorted by their slots
   bool joints = false;   // some effect acts on joints
   bool bodies = false;   // on bodies
-  bool springs = false;  // some potential beside gravity's
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
   bool bounces = false;  // some limit has a restitution
-  std::vector<SmoothCurve> curves;  // of every given motion
-  bool servos_move = false;  // some servo has a table
-  bool revises = false;  // what acts is settled within the solve: friction, limits, servos with a limit, ground
+  bool revises = false;  // what acts is settled within the solve: some effect has states
   bool bends = false;    // velocities are held to how the motion bends (velocity.md): something revises, or acts more at the beginning of a step
   bool any() const { return joints || bodies; }
 
   Field<Index> q_row;               // position row of a screw's velocity row
-  std::vector<double> damping_share, servo_share, drag_share;
-  std::vector<double> servo_ratio;  // of which servo_share is the begin_share: it goes with the gains
+  std::vector<SmoothCurve> curves;  // of every given motion
+  std::vector<double> inertia;      // that a force on each row moves, all others free [kg m^2, kg]; empty where no law asks
+  std::vector<double> mass;         // that a force on each body is taken to move [kg]
   Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
   GroundPlan ground;                // no points without ground
+  std::vector<TouchedBody> touched;  // sorted by slot
+
+  /// What laws are built from.
+  LawSetup setup(const Tree& tree) const { return {effects, tree, q_row, inertia, mass, curves, ground, step_}; }
   /// Joints whose motion is given are where it is at a time [s], whatever stands in q [nq], and as fast as it goes on from there.
   void put_positions(double time, std::span<double> q) const;
   void put_velocities(double time, std::span<double> v) const;
   /// Numbers beside those of rows that are kept from step to step (EffectSweeps::kept).
-  Index kept() const { return ground.kept() + 3 * static_cast<Index>(curves.size()); }
-  std::vector<TouchedBody> touched;  // sorted by slot
+  Index kept() const { return kept_; }
+
+ private:
+  void place_joints(const Model& model);
+  void place_ground(const Model& model, const Options& options);
+  void sort_bodies(const LawSetup& setup);
+  void follow_laws(const LawSetup& setup);
+
+  double step_;
+  Index kept_ = 0;
 };
 
 /// action(std::true_type) where there is any effect, else action(std::false_type). What steps is compiled for each apart, so that a step

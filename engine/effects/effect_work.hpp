@@ -1,52 +1,50 @@
 // engine/effects/effect_work.hpp
-// The account of a scene's effects.
+// The account of a scene's effects: of each of them as its facts say, layout/effects/facts.hpp.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
-#include "layout/field.hpp"
+#include "layout/effects.hpp"
 
 namespace linden {
 
 /// What effects gave (driving ones) or took (losses) [J].
-#define LINDEN_EFFECT_WORK(FIELD)     \
-  FIELD(damping, "taken")             \
-  FIELD(friction, "taken")            \
-  FIELD(limits, "taken")              \
-  FIELD(servo, "given")               \
-  FIELD(torque, "given")              \
-  FIELD(motion, "given")              \
-  FIELD(wrench, "given")              \
-  FIELD(drag, "taken")                \
-  FIELD(ground, "taken")
-
 struct EffectWork {
-#define LINDEN_MEMBER(name, sense) double name = 0;
-  LINDEN_EFFECT_WORK(LINDEN_MEMBER)
-#undef LINDEN_MEMBER
+  std::array<double, kEffectLists> each{};  // list by list; zero of what neither gives nor takes
+
+  /// Of the effect with entries of this kind: work.of<JointFriction>().
+  template <class Entry>
+  double& of() {
+    return each[kListOf<Entry>];
+  }
+  template <class Entry>
+  double of() const {
+    return each[kListOf<Entry>];
+  }
 
   void add(const EffectWork& more) {
-#define LINDEN_ADD(name, sense) name += more.name;
-    LINDEN_EFFECT_WORK(LINDEN_ADD)
-#undef LINDEN_ADD
+    for (std::size_t k = 0; k < each.size(); ++k) each[k] += more.each[k];
   }
   double magnitude() const {
     double sum = 0;
-#define LINDEN_MAGNITUDE(name, sense) sum += std::abs(name);
-    LINDEN_EFFECT_WORK(LINDEN_MAGNITUDE)
-#undef LINDEN_MAGNITUDE
+    for (const double work : each) sum += std::abs(work);
     return sum;
   }
   /// What drives, and on the whole took energy, is among what takes.
   double given() const { return driven(1); }
-  double taken() const { return damping + friction + limits + drag + ground + driven(-1); }
+  double taken() const {
+    double sum = 0;
+    for (std::size_t k = 0; k < each.size(); ++k) sum += kEffectFacts[k]->account == Account::taken ? each[k] : 0;
+    return sum + driven(-1);
+  }
 
  private:
   /// Of what drives: all that gave (way 1), or took (way -1).
   double driven(double way) const {
     double sum = 0;
-    for (const double work : {servo, torque, motion, wrench}) sum += std::max(way * work, 0.0);
+    for (std::size_t k = 0; k < each.size(); ++k) sum += kEffectFacts[k]->account == Account::given ? std::max(way * each[k], 0.0) : 0;
     return sum;
   }
 };
@@ -66,17 +64,12 @@ struct LeastLoss {
 /// Of one step, with where each of those effects gave that can only take.
 struct EffectAccount {
   EffectWork work;
-  LeastLoss damping, friction, limits, drag, ground;
+  std::array<LeastLoss, kEffectLists> least;
   double kinetic = 0;  // of the mean motion [J]
 
   void add(const EffectAccount& part) {
     work.add(part.work);
-    const auto least = [](LeastLoss& mine, const LeastLoss& other) { mine.see(other.at, other.loss); };
-    least(damping, part.damping);
-    least(friction, part.friction);
-    least(limits, part.limits);
-    least(drag, part.drag);
-    least(ground, part.ground);
+    for (std::size_t k = 0; k < least.size(); ++k) least[k].see(part.least[k].at, part.least[k].loss);
     kinetic = part.kinetic;
   }
 };

@@ -47,12 +47,12 @@ class ImpulseAccount {
                           (held ? residual(row) : 0);
         end_(row) = 0;
       }
-      ball_spring_map(plan.effects.ball_springs, model.tree, h, q, motion, projected_);
-      ball_spring_end_map(plan.effects.ball_springs, model.tree, h, q, motion, end_);
+      effects.evaluate(motion, projected_);
+      effects.evaluate_end(motion, end_);
       for (Index row = 0; row < projected_.rows(); ++row) sum_.joints[static_cast<std::size_t>(row)] += rate * projected_(row) + end_(row);
       const Servos<double>& servos = effects.servos();
       for (std::size_t k = 0; k < sum_.servos.size(); ++k) {
-        const auto [o, g, most] = servo_law(servos, static_cast<Index>(k), plan.q_row, h, q);
+        const auto [o, g, most] = servo_force(servos, static_cast<Index>(k), plan.q_row, h, q);
         const double mode = servos.mode(static_cast<Index>(k));
         sum_.servos[k] += rate * (mode == 0 ? -(o + g * delta(servos.entries[k].row)) : mode * most);
       }

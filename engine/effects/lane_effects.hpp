@@ -10,8 +10,8 @@
 #include "engine/effects/effect_controls.hpp"
 #include "engine/effects/no_effects.hpp"
 #include "engine/solve/block_stepper.hpp"
-#include "kernels/values/lanes_of.hpp"
 #include "kernels/tree/innovation_up.hpp"
+#include "kernels/values/lanes_of.hpp"
 #include "layout/packed_history.hpp"
 
 namespace linden {

@@ -9,46 +9,28 @@
 #include "layout/support/words.hpp"
 
 namespace linden {
-namespace {
-
-struct Passive {
-  const char* name;
-  double EffectWork::*loss;
-  LeastLoss EffectAccount::*least;
-  bool on_joints;
-};
-
-constexpr std::array<Passive, 5> kPassive{{
-    {"damping", &EffectWork::damping, &EffectAccount::damping, true},
-    {"friction", &EffectWork::friction, &EffectAccount::friction, true},
-    {"limits", &EffectWork::limits, &EffectAccount::limits, true},
-    {"drag", &EffectWork::drag, &EffectAccount::drag, false},
-    {"ground", &EffectWork::ground, &EffectAccount::ground, false},
-}};
-
-}  // namespace
-
 PassiveWatch::PassiveWatch(const Model& model, const Effects& effects)
     : model_(model), still_air_(effects.wind == std::array<double, 3>{0, 0, 0}) {}
 
 void PassiveWatch::add(const EffectAccount& step, double time) {
   done_ += step.work.magnitude();
   scale_ = std::max({scale_, step.kinetic, done_});
-  for (std::size_t k = 0; k < kPassive.size(); ++k) {
-    const Passive& passive = kPassive[k];
-    if (passive.loss == &EffectWork::drag && !still_air_) continue;
+  for (std::size_t k = 0; k < kEffectLists; ++k) {
+    const EffectFacts& facts = *kEffectFacts[k];
+    if (facts.account != Account::taken || (k == kListOf<Drag> && !still_air_)) continue;
     Watched& watched = watched_[k];
-    watched.taken += step.work.*passive.loss;
+    watched.taken += step.work.each[k];
     watched.most = std::max(watched.most, watched.taken);
     const double gift = watched.most - watched.taken;
     if (!(gift > kGift * scale_)) continue;
     if (watched.gift < 0) {
-      const LeastLoss& least = step.*passive.least;
-      const auto& names = passive.on_joints ? model_.names.velocity : model_.names.body;
+      const LeastLoss& least = step.least[k];
+      const bool on_joints = facts.site == Site::joint;
+      const auto& names = on_joints ? model_.names.velocity : model_.names.body;
       watched.gift = static_cast<int>(gifts_.size());
-      gifts_.push_back({passive.name,
+      gifts_.push_back({std::string(facts.name),
                         least.at < 0 ? std::string("no place of its own")
-                                     : fmt::format("{} {}", passive.on_joints ? "joint" : "body", quoted(names[static_cast<std::size_t>(least.at)])),
+                                     : fmt::format("{} {}", on_joints ? "joint" : "body", quoted(names[static_cast<std::size_t>(least.at)])),
                         time, gift});
     }
     PassiveGift& told = gifts_[static_cast<std::size_t>(watched.gift)];

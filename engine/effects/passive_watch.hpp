@@ -17,8 +17,6 @@
 
 namespace linden {
 
-struct Effects;
-
 /// An effect that gave energy although it can only take it.
 struct PassiveGift {
   std::string effect;
@@ -38,7 +36,6 @@ class PassiveWatch {
 
  private:
   static constexpr double kGift = 0.01;
-  static constexpr std::size_t kEffects = 5;
 
   struct Watched {
     double taken = 0, most = 0;
@@ -46,9 +43,9 @@ class PassiveWatch {
   };
 
   const Model& model_;
-  bool still_air_;
+  bool still_air_;  // where none moves, drag gives nothing either
   double scale_ = 0, done_ = 0;
-  std::array<Watched, kEffects> watched_;
+  std::array<Watched, kEffectLists> watched_;  // list by list
   std::vector<PassiveGift> gifts_;
 };
 

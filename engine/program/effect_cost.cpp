@@ -4,6 +4,9 @@
 #include <chrono>
 #include <limits>
 #include <memory>
+#include <span>
+#include <string_view>
+#include <utility>
 
 #include "engine/simulation.hpp"
 
@@ -56,35 +59,21 @@ class Contender {
 std::vector<EffectCost> effect_costs(const Scene& scene) {
   const auto model = std::make_shared<const Model>(scene.model);
   std::vector<std::unique_ptr<Contender>> contenders;
-  const auto contend = [&](const char* name, const Effects& effects) {
-    contenders.push_back(std::make_unique<Contender>(name, model, scene, effects));
+  const auto contend = [&](std::string name, const Effects& effects) {
+    contenders.push_back(std::make_unique<Contender>(std::move(name), model, scene, effects));
   };
   contend("none", {});
-  const auto alone = [&](const char* name, auto Effects::*list) {
-    if ((scene.effects.*list).empty()) return;
-    Effects effects;
-    effects.*list = scene.effects.*list;
-    effects.wind = scene.effects.wind;
-    contend(name, effects);
-  };
-  alone("armature", &Effects::armature);
-  if (!scene.effects.springs.empty() || !scene.effects.ball_springs.empty()) {
-    Effects effects;
-    effects.springs = scene.effects.springs;
-    effects.ball_springs = scene.effects.ball_springs;
-    contend("spring", effects);
-  }
-  alone("damping", &Effects::damping);
-  alone("friction", &Effects::friction);
-  alone("limits", &Effects::limits);
-  alone("servo", &Effects::servos);
-  alone("torque", &Effects::torques);
-  alone("wrench", &Effects::wrenches);
-  alone("drag", &Effects::drag);
-  if (scene.effects.ground) {
-    Effects effects;
-    effects.ground = scene.effects.ground;
-    contend("ground", effects);
+  // lists of one name are one effect
+  std::vector<std::string_view> names;
+  Effects::each(scene.effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if (!entries.empty() && std::ranges::find(names, Entry::facts.name) == names.end()) names.push_back(Entry::facts.name);
+  });
+  for (const std::string_view name : names) {
+    Effects effects = scene.effects;
+    Effects::each(scene.effects, [&]<class Entry>(std::span<const Entry>, std::string_view) {
+      if (Entry::facts.name != name) effects.list<Entry>() = {};
+    });
+    contend(std::string(name), effects);
   }
   contend("all", scene.effects);
   for (int round = 0; round < kRounds; ++round) {

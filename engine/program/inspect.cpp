@@ -220,15 +220,16 @@ class Printer {
     const Scene& scene = *arguments_.scene;
     say("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
     const auto& g = arguments_.options.gravity;
-    if (g != std::array<double, 3>{0, 0, 0}) say("  {:<9} {:g} {:g} {:g} m/s^2\n", "gravity", g[0], g[1], g[2]);
-    for (const EffectLine& line : effect_lines(scene.effects, model_)) {
-      say("  {:<9} {}, {}\n", line.name, line.where, line.what);
-    }
+    const std::vector<EffectLine> lines = effect_lines(scene.effects, model_);
+    std::size_t width = 9;
+    for (const EffectLine& line : lines) width = std::max(width, line.name.size());
+    if (g != std::array<double, 3>{0, 0, 0}) say("  {:<{}} {:g} {:g} {:g} m/s^2\n", "gravity", width, g[0], g[1], g[2]);
+    for (const EffectLine& line : lines) say("  {:<{}} {}, {}\n", line.name, width, line.where, line.what);
     if (scene.randomization.any()) say("\ndrawn for each instance: {}\n", randomization_text(scene.randomization));
     const std::vector<EffectCost>& costs = costs_.effects;
     say("\nwhat a step costs on this machine, ns per body: {:.0f} without effects, {:.0f} with all\n", costs.front().nanoseconds,
                costs.back().nanoseconds);
-    for (std::size_t k = 1; k + 1 < costs.size(); ++k) say("  {:<9} {:+.0f} alone\n", costs[k].name, costs[k].nanoseconds);
+    for (std::size_t k = 1; k + 1 < costs.size(); ++k) say("  {:<{}} {:+.0f} alone\n", costs[k].name, width, costs[k].nanoseconds);
   }
 
   void table() const {

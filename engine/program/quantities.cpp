@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
@@ -16,38 +18,42 @@ namespace {
 const std::vector<std::string> kNames{"positions", "velocities", "servos", "forces", "energies", "contacts"};
 
 struct EnergyRow {
-  const char* name;
-  bool there;
+  std::string name;
+  double now;  // [J]
 };
 
-/// In the order of Observer::energies.
-std::vector<EnergyRow> energy_rows(const Simulation& simulation) {
-  const Effects& e = simulation.effects();
-  const bool gravity = simulation.options().gravity != std::array<double, 3>{0, 0, 0};
-  return {{"kinetic", true},
-          {"gravity", gravity},
-          {"springs", !e.springs.empty() || !e.ball_springs.empty()},
-          {"ground", e.ground.has_value()},
-          {"damping_taken", !e.damping.empty()},
-          {"friction_taken", !e.friction.empty()},
-          {"limits_taken", !e.limits.empty()},
-          {"servo_given", !e.servos.empty()},
-          {"torque_given", !e.torques.empty()},
-          {"wrench_given", !e.wrenches.empty()},
-          {"drag_taken", !e.drag.empty()},
-          {"ground_taken", e.ground.has_value()}};
+/// Energies that there are in the scene, and what each of its effects took or gave so far.
+std::vector<EnergyRow> energy_rows(Simulation& simulation) {
+  const Effects& effects = simulation.effects();
+  const Energy energy = simulation.energy();
+  std::vector<EnergyRow> rows{{"kinetic", energy.kinetic}};
+  if (simulation.options().gravity != std::array<double, 3>{0, 0, 0}) rows.push_back({"gravity", energy.gravity()});
+  bool springs = false;
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    springs = springs || (Entry::facts.stores && Entry::facts.site == Site::joint && !entries.empty());
+  });
+  if (springs) rows.push_back({"springs", energy.springs});
+  if (effects.ground) rows.push_back({"ground", energy.ground});
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if (Entry::facts.account == Account::none || entries.empty()) return;
+    const std::string_view sense = Entry::facts.account == Account::taken ? "taken" : "given";
+    rows.push_back({fmt::format("{}_{}", Entry::facts.name, sense), simulation.effect_work().of<Entry>()});
+  });
+  return rows;
 }
 
 /// Quantities that there are in the scene.
 std::vector<Quantity> available(const Simulation& simulation) {
-  const Effects& e = simulation.effects();
+  const Effects& effects = simulation.effects();
   std::vector<Quantity> there{Quantity::positions, Quantity::velocities};
-  if (!e.servos.empty()) there.push_back(Quantity::servos);
-  const bool acts = !(e.springs.empty() && e.ball_springs.empty() && e.damping.empty() && e.friction.empty() && e.limits.empty() &&
-                      e.servos.empty() && e.torques.empty() && e.wrenches.empty() && e.drag.empty() && !e.ground);
+  if (!effects.servos.empty()) there.push_back(Quantity::servos);
+  bool acts = false;  // a rotor alone does not
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    acts = acts || (!std::is_same_v<Entry, Armature> && !entries.empty());
+  });
   if (acts) there.push_back(Quantity::forces);
   there.push_back(Quantity::energies);
-  if (e.ground) there.push_back(Quantity::contacts);
+  if (effects.ground) there.push_back(Quantity::contacts);
   return there;
 }
 
@@ -113,9 +119,7 @@ Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities) : s
         break;
       case Quantity::energies: {
         RecordedArray array{"energies", "energy_names", {}, "energy."};
-        for (const EnergyRow& row : energy_rows(simulation)) {
-          if (row.there) array.rows.push_back(row.name);
-        }
+        for (const EnergyRow& row : energy_rows(simulation)) array.rows.push_back(row.name);
         add(quantity, std::move(array));
         break;
       }
@@ -137,16 +141,9 @@ void Observer::add(Quantity quantity, RecordedArray array) {
 }
 
 std::vector<double> Observer::energies() {
-  const Energy energy = simulation_.energy();
-  const EffectWork& work = simulation_.effect_work();
-  const std::array<double, 12> all{energy.kinetic, energy.gravity(), energy.springs, energy.ground, work.damping, work.friction,
-                                   work.limits,    work.servo,       work.torque,    work.wrench,   work.drag,    work.ground};
-  std::vector<double> there;
-  const std::vector<EnergyRow> rows = energy_rows(simulation_);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (rows[k].there) there.push_back(all[k]);
-  }
-  return there;
+  std::vector<double> now;
+  for (const EnergyRow& row : energy_rows(simulation_)) now.push_back(row.now);
+  return now;
 }
 
 std::span<const std::span<const double>> Observer::look() {

@@ -19,7 +19,11 @@ void note(const std::string& text) { fmt::print(stderr, "linden: note: {}\n", pr
 std::string load_of(const Effects& effects) {
   if (effects.ground) return "a ground";
   if (!effects.servos.empty()) return "servos";
-  return effects.springs.empty() && effects.ball_springs.empty() ? "" : "springs";
+  bool springs = false;
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    springs = springs || (Entry::facts.stores && !entries.empty());
+  });
+  return springs ? "springs" : "";
 }
 
 void look_at_scene(const MotionArguments& arguments, const Options& options) {

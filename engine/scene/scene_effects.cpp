@@ -6,11 +6,13 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <utility>
 
 #include "engine/scene/number_table.hpp"
 #include "engine/scene/scene_course.hpp"
 #include "engine/scene/scene_joints.hpp"
+#include "engine/scene/scene_numbers.hpp"
 #include "engine/scene/scene_servos.hpp"
 #include "engine/text.hpp"
 #include "layout/smooth_curve.hpp"
@@ -25,9 +27,19 @@ using Eigen::Vector3d;
 using Kind = SceneValue::Kind;
 using Entry = SceneValue::Entry;
 
-const std::vector<std::string> kEffects{"gravity", "armature", "damping", "friction", "spring", "limits",
-                                        "servo",   "torque",   "motion",  "wrench",   "drag",   "ground"};
-const std::vector<std::string> kSpring{"stiffness", "rest"};
+/// gravity, and the names of all effects.
+const std::vector<std::string> kEffects = [] {
+  std::vector<std::string> names{"gravity"};
+  for (const EffectFacts* facts : kEffectFacts) {
+    if (std::ranges::find(names, facts->name) == names.end()) names.emplace_back(facts->name);
+  }
+  return names;
+}();
+
+/// Says which effect a reader is for: Reader has one for each that is not read by its table of numbers.
+template <class Entry>
+struct Of {};
+
 const std::vector<std::string> kLimit{"lower", "upper", "restitution", "velocity"};
 const std::vector<std::string> kWrench{"force", "moment", "point", "frame", "from", "to", "file"};
 const std::vector<std::string> kFrames{"world", "body"};
@@ -40,7 +52,6 @@ const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 constexpr double kRounding = 1e-9;
 
 constexpr std::string_view kVelocityLimit = "urdf or a number";
-constexpr std::string_view kUrdfOrNumber = "urdf, a number or {joint: number}";
 
 std::array<double, 3> array_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -51,7 +62,7 @@ class Reader {
       : model_(model), start_(start), folder_(std::move(folder)), joints_(model) {}
 
   std::vector<JointLimit> read_limits(const SceneValue& at) {
-    if (const auto value = at.find("limits")) limits(*value);
+    if (const auto value = at.find("limits")) read(*value, Of<JointLimit>());
     return std::move(result_.effects.limits);
   }
 
@@ -60,17 +71,12 @@ class Reader {
     for (const auto& [key, value] : at.entries_of(kEffects)) {
       const std::vector<std::string>::size_type before = result_.warnings.size();
       if (key == "gravity") result_.gravity = value.vector("[x, y, z] in m/s^2");
-      if (key == "armature") armature(value);
-      if (key == "damping") damping(value);
-      if (key == "friction") friction(value);
-      if (key == "spring") spring(value);
-      if (key == "limits") limits(value);
-      if (key == "servo") result_.effects.servos = read_servos(value, joints_, start_, folder_, result_.warnings);
-      if (key == "torque") torque(value);
-      if (key == "motion") motion(value);
-      if (key == "wrench") wrench(value);
-      if (key == "drag") drag(value);
-      if (key == "ground") ground(value);
+      // captured by name: a structured binding cannot be
+      const std::string& name = key;
+      const SceneValue& here = value;
+      Effects::each(result_.effects, [&]<class Effect>(std::span<const Effect>, std::string_view) {
+        if (Effect::facts.name == name) read(here, Of<Effect>());
+      });
       for (std::size_t k = before; k < result_.warnings.size(); ++k) {
         result_.warnings[k] = fmt::format("{}: {}", value.place(), result_.warnings[k]);
       }
@@ -89,70 +95,39 @@ class Reader {
     return value;
   }
 
-  void armature(const SceneValue& at) {
-    std::vector<Armature>& list = result_.effects.armature;
-    if (at.says("urdf"))
-      at.refuse("a number or {joint: number}", "URDF files say nothing of rotors: give a number, such as 0.01");
-    if (at.is(Kind::text)) {
-      list = armature_everywhere(model_, at.not_negative("a number or {joint: number}"));
-    } else {
-      for (const Entry& entry : at.entries("a number or {joint: number}"))
-        list.push_back({joints_.screw(entry).row, entry.value.not_negative()});
-      list = on_leaders(model_, list);
-    }
+  /// An effect that is nothing but numbers.
+  template <HasFields Effect>
+  void read(const SceneValue& at, Of<Effect>) {
+    auto& list = result_.effects.list<Effect>();
+    list = read_list<Effect>(at, joints_);
     if (list.empty()) warn("no joint has any");
   }
 
-  void damping(const SceneValue& at) {
-    std::vector<JointDamping>& list = result_.effects.damping;
-    if (at.says("urdf")) {
-      list = urdf_damping(model_);
-    } else if (at.is(Kind::text)) {
-      list = damping_everywhere(model_, at.not_negative(kUrdfOrNumber));
-    } else {
-      for (const Entry& entry : at.entries(kUrdfOrNumber)) {
-        const NamedJoint found = joints_.joint(entry);
-        const double coefficient = entry.value.not_negative();
-        for (Index k = 0; k < velocity_count(found.kind); ++k) list.push_back({found.row + k, coefficient});
-      }
-      list = on_leaders(model_, list);
-    }
-    if (list.empty()) warn("no joint has any");
-  }
-
-  void friction(const SceneValue& at) {
-    std::vector<JointFriction>& list = result_.effects.friction;
-    if (at.says("urdf")) {
-      list = urdf_friction(model_);
-    } else if (at.is(Kind::text)) {
-      list = friction_everywhere(model_, at.not_negative(kUrdfOrNumber));
-    } else {
-      for (const Entry& entry : at.entries(kUrdfOrNumber)) list.push_back({joints_.screw(entry).row, entry.value.not_negative()});
-      list = on_leaders(model_, list);
-    }
-    if (list.empty()) warn("no joint has any");
-  }
-
-  void spring(const SceneValue& at) {
-    for (const Entry& entry : at.entries("{joint: {stiffness, rest}}")) {
+  void read(const SceneValue& at, Of<JointSpring>) {
+    for (const Entry& entry : at.entries(grammar_of<JointSpring>())) {
       const NamedJoint found = joints_.joint(entry);
       joints_.refuse_follower(entry.value, found);
-      entry.value.entries_of(kSpring);
-      const auto stiffness = entry.value.find("stiffness"), rest = entry.value.find("rest");
-      if (!stiffness)
-        entry.value.fail(entry.value.path() + " has no stiffness", "stiffness and, where it is not 0, rest", "add stiffness");
       if (found.kind == JointKind::screw) {
-        result_.effects.springs.push_back({found.row, stiffness->not_negative(), rest ? rest->number() : 0});
-      } else {
-        BallSpring ball{found.slot, stiffness->not_negative()};
-        if (rest) ball.rest = rest->quaternion();
-        result_.effects.ball_springs.push_back(ball);
+        result_.effects.springs.push_back(read_entry<JointSpring>(entry.value, found.row));
+        continue;
       }
+      entry.value.entries_of(field_names<JointSpring>());
+      const auto stiffness = entry.value.find("stiffness"), rest = entry.value.find("rest");
+      if (!stiffness) entry.value.fail(entry.value.path() + " has no stiffness", "stiffness", "add stiffness");
+      BallSpring ball{found.slot, stiffness->not_negative()};
+      if (rest) ball.rest = rest->quaternion();
+      result_.effects.ball_springs.push_back(ball);
     }
     if (result_.effects.springs.empty() && result_.effects.ball_springs.empty()) warn("no joint has any");
   }
+  /// Read among the other springs.
+  void read(const SceneValue&, Of<BallSpring>) {}
 
-  void limits(const SceneValue& at) {
+  void read(const SceneValue& at, Of<Servo>) {
+    result_.effects.servos = read_servos(at, joints_, start_, folder_, result_.warnings);
+  }
+
+  void read(const SceneValue& at, Of<JointLimit>) {
     std::vector<JointLimit>& list = result_.effects.limits;
     SharedLimits shared;
     bool named = false;
@@ -223,7 +198,7 @@ class Reader {
     return result;
   }
 
-  void torque(const SceneValue& at) {
+  void read(const SceneValue& at, Of<JointTorque>) {
     for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values}}")) {
       const NamedJoint named = joints_.screw(entry);
       joints_.refuse_follower(entry.value, named);
@@ -232,7 +207,7 @@ class Reader {
     if (result_.effects.torques.empty()) warn("no joint has any");
   }
 
-  void motion(const SceneValue& at) {
+  void read(const SceneValue& at, Of<JointMotion>) {
     for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values, velocities}}")) {
       const NamedJoint named = joints_.screw(entry);
       joints_.refuse_follower(entry.value, named);
@@ -264,7 +239,7 @@ class Reader {
     }
   }
 
-  void wrench(const SceneValue& at) {
+  void read(const SceneValue& at, Of<BodyWrench>) {
     for (const Entry& entry : at.entries("{link: {force, moment, point, frame, from, to, file}}")) {
       const LinkPlace place = joints_.body(entry.value, entry.key);
       if (!entry.value.is(Kind::list)) {
@@ -300,7 +275,7 @@ class Reader {
     return result;
   }
 
-  void drag(const SceneValue& at) {
+  void read(const SceneValue& at, Of<Drag>) {
     at.entries_of(kDrag);
     const auto coefficients = [](const SceneValue& place, Drag drag) {
       if (const auto value = place.find("linear")) drag.linear = value->not_negative();
@@ -337,7 +312,7 @@ class Reader {
     if (result_.effects.drag.empty()) warn("no body has any: linear and quadratic are zero or not given");
   }
 
-  void ground(const SceneValue& at) {
+  void read(const SceneValue& at, Of<Ground>) {
     Ground ground;
     if (!at.is(Kind::nothing)) {
       at.entries_of(kGround);

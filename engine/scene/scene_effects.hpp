@@ -6,6 +6,7 @@
 //   damping    urdf | number (every screw and ball joint) | {joint: number}
 //   friction   urdf | number (every screw joint) | {joint: number}
 //   spring     {joint: {stiffness, rest: number, or of a ball joint quaternion}}
+//   dead_zone_spring  {joint: {stiffness, half_width, rest}}
 //   limits     urdf | {restitution, velocity: urdf | number} (all of the URDF's; a number on every screw joint)
 //               | {joint: urdf | {lower, upper, restitution, velocity}}
 //   servo      {stiffness, damping, max_force: urdf | none | number, targets, velocities, feedforward: {joint: over time},
@@ -18,7 +19,7 @@
 // A servo acts on every screw joint; on those that `joints` names where it is a list, or a map without a `stiffness` beside it. Targets
 // are the positions at the start where none are given; a target that moves has no velocity but the one given for it. Limits of velocity
 // are none but those that are named: `limits: urdf` means positions.
-// Mimic joints: armature, damping, friction and limits of a follower act on its leader; spring, servo, torque and motion refuse it.
+// Mimic joints: armature, damping, friction and limits of a follower act on its leader; springs, servo, torque and motion refuse it.
 // Free joints have none of these, ball joints damping and spring only. A link that is merged into another's body acts there.
 // CSV files are found relative to the scene: time,value a line for torque, servo, motion
 // (also time,position,velocity) and wrench (there a share of force and moment).

@@ -9,8 +9,8 @@
 #include <array>
 #include <limits>
 
-#include "kernels/values/lanes_of.hpp"
 #include "kernels/tree/largest_turn.hpp"
+#include "kernels/values/lanes_of.hpp"
 #include "kernels/values/scalar.hpp"
 
 namespace linden {

@@ -18,9 +18,9 @@
 
 #include <array>
 
-#include "engine/effects/revision.hpp"
 #include "engine/solve/decide.hpp"
 #include "engine/solve/judge.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 

@@ -165,7 +165,7 @@ bool TreeStepper<kEffects>::strike(State<double>& state, double h, bool arrived,
 {
   if (effects_.plan().effects.limits.empty() || !blows_.met(state)) return false;
   const int before = report.blows;
-  account_.work.limits += blows_.strike(state, arrived, report.blows);
+  account_.work.of<JointLimit>() += blows_.strike(state, arrived, report.blows);
   if (report.blows == before) return false;
   for (Index row = 0; row < before_.rows(); ++row) state.history(row, 0) = h * blows_.velocity()(row);
   state.last_step(0) = h;
@@ -332,7 +332,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   }
   sweeps_.arrive(h, state);
   if constexpr (kEffects) {
-    part.work.ground -= effects_.ground_stored();
+    part.work.of<Ground>() -= effects_.ground_stored();
     part.kinetic = solve_.mean_kinetic();
     account_.add(part);
     time_ += h;

@@ -154,7 +154,7 @@ class Bench {
     });
     add("fold_mimics", [&] { fold_mimics(sweeps_.mimics(), p_); });
     if constexpr (kEffects) {
-      sweeps_.effects().each_kernel(constants, state_.q, w, rate_, [&](const char* name, Call call) { add(name, std::move(call)); });
+      sweeps_.effects().each_kernel(constants, w, rate_, [&](std::string_view name, Call call) { add(std::string(name), std::move(call)); });
     }
   }
 

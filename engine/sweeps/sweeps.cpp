@@ -1,17 +1,42 @@
 #include "engine/sweeps/sweeps.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+
+#include "kernels/effects/laws.hpp"
 
 #include "engine/effects/effect_plan.hpp"
 #include "engine/sweeps/strategy.hpp"
 
 namespace linden {
 
+namespace {
+
+/// What a part of a law is called in the schedule: add belongs to the beginning of the step for joints, to each evaluation for bodies.
+constexpr std::string_view first = "first", evaluation = "evaluation", factor = "factor", correction = "correction", last = "last";
+
+/// Sweeps of the laws that have anything to do, as far as they are this part.
+void add_parts(const EffectPlan& plan, const Model& model, Part part, Site site, std::string_view when, std::vector<Sweep>& list) {
+  const LawSetup setup = plan.setup(model.tree);
+  const auto add = [&]<class Law>(bool acts, bool settling) {
+    for (const PartSweep& sweep : Law::sweeps) {
+      if (sweep.part == part && acts && (part != Part::revise || settling)) list.push_back({when, sweep.name, sweep.reads, sweep.writes});
+    }
+  };
+  if (site == Site::joint) {
+    each_law_type<JointLaws<double>>([&]<class Law>() {
+      const auto& entries = plan.effects.list<typename Law::Entry>();
+      add.template operator()<Law>(!entries.empty(), std::ranges::any_of(entries, settles<typename Law::Entry>));
+    });
+  } else {
+    each_law_type<BodyLaws<double>>([&]<class Law>() { add.template operator()<Law>(!Law::touching(setup).empty(), Law::facts.has_states); });
+  }
+}
+
+}  // namespace
+
 std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const EffectPlan& plan) {
-  const Effects& effects = plan.effects;
-  const bool joints = plan.joints, bodies = plan.bodies, points = !plan.ground.points.empty();
-  const bool limited = std::ranges::any_of(effects.servos, [](const Servo& servo) { return std::isfinite(servo.max_force); });
+  const bool joints = plan.joints, bodies = plan.bodies;
   const bool newton = options.solver == Solver::newton;
   const bool ties = !model.mimics.empty();
   const Strategy strategy = strategy_of(model, options, plan);
@@ -21,8 +46,8 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   const auto add = [&](bool present, const Sweep& sweep) {
     if (present) list.push_back(sweep);
   };
+  const auto add_laws = [&](Part part, Site site, std::string_view when) { add_parts(plan, model, part, site, when, list); };
 
-  constexpr std::string_view first = "first", evaluation = "evaluation", factor = "factor", correction = "correction", last = "last";
   add(true, {first, "momentum_target_map", "p, force", "momentum_target"});
   switch (options.guess) {
     case FirstGuess::extrapolation: add(true, {first, "first guess: extrapolation", "history", "delta"}); break;
@@ -36,24 +61,15 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
       add(true, {first, "impulse_pass_up, rate_down", "placement, gains, residual", "delta"});
       break;
   }
-  add(!effects.motions.empty(), {first, "given_motion_map", "motions, time, q", "delta"});
-  add(!effects.limits.empty(), {first, "begin_limits", "q, history, delta", "limits, delta"});
-  add(!effects.friction.empty(), {first, "begin_friction", "history, delta", "friction, delta"});
-  add(!effects.armature.empty(), {first, "armature_map", "armature", "joint impulses"});
-  add(!effects.springs.empty(), {first, "spring_map", "springs, q", "joint impulses"});
-  add(!effects.ball_springs.empty(), {first, "ball_spring_stiffness", "ball springs", "joint impulses"});
-  add(!effects.damping.empty(), {first, "damping_map", "damping", "joint impulses"});
-  add(!effects.torques.empty(), {first, "torque_map", "torques, time", "joint impulses"});
-  add(!effects.servos.empty(), {first, "servo_map", "servos, q", "joint impulses"});
-  add(!effects.friction.empty(), {first, "friction_map", "friction", "joint impulses"});
+  add_laws(Part::begin, Site::body, first);
+  add_laws(Part::begin, Site::joint, first);
+  add_laws(Part::add, Site::joint, first);
   add(true, {first, "motion_map", "screw, delta", "motion"});
   add(true, {evaluation, "displacement_down", "placement, motion", "displacement"});
   add(true, {evaluation, "momentum_map", "inertia, displacement", "impulse"});
-  add(!effects.drag.empty(), {evaluation, "drag_map", "drag, pose, displacement", "impulse, body impulses"});
-  add(!effects.wrenches.empty(), {evaluation, "wrench_map", "wrenches, pose, displacement", "impulse, body impulses"});
-  add(points, {evaluation, "ground_map", "points, displacement", "points, impulse, body impulses"});
+  add_laws(Part::add, Site::body, evaluation);
   add(joints, {evaluation, "joint_impulses_map", "joint impulses, delta", "momentum_target"});
-  add(!effects.ball_springs.empty(), {evaluation, "ball_spring_map", "ball springs, q, motion", "momentum_target"});
+  add_laws(Part::evaluate, Site::joint, evaluation);
   add(!one_pass, {evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual"});
   add(ties, {evaluation, "fold_mimics", "residual", "residual"});
   add(newton, {factor, "newton_factor_up", "inertia, screw, placement, motion, displacement", "gains"});
@@ -64,10 +80,8 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   add(newton, {correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment"});
   add(!newton, {correction, "rate_down", "screw, placement, gains, innovation", "variation, increment"});
   add(ties, {correction, "ties: completion", "increment, ties", "increment"});
-  add(limited, {correction, "revise_servos", "servos, q, delta", "servos, joint impulses"});
-  add(!effects.friction.empty(), {correction, "revise_friction", "innovation, delta", "friction, delta, joint impulses"});
-  add(!effects.limits.empty(), {correction, "revise_limits", "innovation, delta", "limits, delta, joint impulses"});
-  add(points, {correction, "revise_ground", "points", "points"});
+  add_laws(Part::revise, Site::joint, correction);
+  add_laws(Part::revise, Site::body, correction);
   add(true, {correction, "correct_motion_map", "screw, increment", "delta, motion"});
   add(quaternions, {last, "displacement_map", "motion", "delta"});
   add(joints, {last, "joint_impulses_end_map", "joint impulses, delta", "p"});
@@ -75,7 +89,7 @@ std::vector<Sweep> sweeps_of(const Model& model, const Options& options, const E
   add(true, {last, "advance_map", "motion, delta", "q, history"});
   add(true, {last, "placement_map", "tree_placement, screw, q", "placement"});
   add(bodies, {last, "world_placement_down", "placement", "pose"});
-  add(points, {last, "find_ground", "pose", "points"});
+  add_laws(Part::place, Site::body, last);
   add(gravity, {last, "gravity_field_down", "placement", "field"});
   add(gravity, {last, "gravity_force_up", "inertia, subtree_mass, screw, placement, field", "first_moment, force"});
   const std::string_view left = one_pass ? "screw, displacement, impulse, innovation, force" : "screw, displacement, impulse, residual, force";

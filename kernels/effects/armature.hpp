@@ -14,8 +14,7 @@
 
 #include <span>
 
-#include "kernels/effects/joint_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -42,5 +41,15 @@ template <class S>
 void add_armature(std::span<const Armature> rotors, const Field<S>& v, Field<S>& p) {
   for (const Armature& rotor : rotors) p(rotor.row) = p(rotor.row) + as<S>(rotor.inertia) * v(rotor.row);
 }
+
+template <class S>
+class ArmatureLaw : public JointLaw<S, Armature> {
+ public:
+  using JointLaw<S, Armature>::JointLaw;
+  static constexpr std::array sweeps{PartSweep{Part::add, "armature_map", "armature", "joint impulses"}};
+  void add(const StepView<S>&, JointImpulses<S>& sum) const { armature_map(this->entries(), sum); }
+  /// No force: it is a part of the mass matrix.
+  static void push(const Armature&, const Instant&, Field<double>&) {}
+};
 
 }  // namespace linden

@@ -18,9 +18,8 @@
 
 #include <span>
 
-#include "kernels/effects/joint_impulses.hpp"
+#include "kernels/effects/law.hpp"
 #include "kernels/values/se3.hpp"
-#include "layout/effects.hpp"
 
 namespace linden {
 
@@ -85,14 +84,29 @@ void ball_spring_end_map(std::span<const BallSpring> springs, const Tree& tree, 
 }
 
 template <class S>
-S ball_spring_potential(std::span<const BallSpring> springs, const Tree& tree, const Field<S>& q) {
-  S sum(0.0);
-  for (const BallSpring& spring : springs) {
-    const Index row = tree.first_q(spring.slot);
-    const Vec3<S> turn = shorter_turn(rest_inverse<S>(spring) * Quaternion<S>{load3<S>(q, row), q(row + 3)});
-    sum = sum + as<S>(0.5 * spring.stiffness) * dot(turn, turn);
+class BallSpringLaw : public JointLaw<S, BallSpring> {
+ public:
+  using JointLaw<S, BallSpring>::JointLaw;
+  static constexpr std::array sweeps{PartSweep{Part::add, "ball_spring_stiffness", "ball springs", "joint impulses"},
+                                     PartSweep{Part::evaluate, "ball_spring_map", "ball springs, q, motion", "momentum_target"}};
+  static bool on_ball(const BallSpring&, const LawSetup&) { return true; }
+  void add(const StepView<S>& step, JointImpulses<S>& sum) const { ball_spring_stiffness(this->entries(), step.tree, step.h, sum); }
+  void evaluate(const StepView<S>& step, const Field<S, 7>& motion, Field<S>& target) const {
+    ball_spring_map(this->entries(), step.tree, step.h, step.q, motion, target);
   }
-  return sum;
-}
+  void end(const StepView<S>& step, const Field<S, 7>& motion, Field<S>& end) const {
+    ball_spring_end_map(this->entries(), step.tree, step.h, step.q, motion, end);
+  }
+  static S potential(const BallSpring& spring, const JointsView<S>& at) {
+    const Index row = at.tree.first_q(spring.slot);
+    const Vec3<S> turn = shorter_turn(rest_inverse<S>(spring) * Quaternion<S>{load3<S>(at.q, row), at.q(row + 3)});
+    return as<S>(0.5 * spring.stiffness) * dot(turn, turn);
+  }
+  static void push(const BallSpring& spring, const Instant& now, Field<double>& force) {
+    const Index from = now.tree.first_q(spring.slot), row = now.tree.first_v(spring.slot);
+    const Vec3<double> turn = shorter_turn(rest_inverse<double>(spring) * Quaternion<double>{load3<double>(now.q, from), now.q(from + 3)});
+    store3(force, row, load3<double>(force, row) - spring.stiffness * turn);
+  }
+};
 
 }  // namespace linden

@@ -13,9 +13,9 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "kernels/effects/joint_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -36,5 +36,26 @@ void damping_loss(std::span<const JointDamping> dampers, std::span<const double>
     each(row, as<S>(dampers[k].coefficient) * delta(row) * worked(share[k], delta(row), before(row)) / h);
   }
 }
+
+template <class S>
+class DampingLaw : public JointLaw<S, JointDamping> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::add, "damping_map", "damping", "joint impulses"}};
+  explicit DampingLaw(const LawSetup& setup) : JointLaw<S, JointDamping>(setup) {
+    for (const JointDamping& damper : this->entries()) share_.push_back(begin_share(ratio(damper, setup.step, setup.inertia_at(damper.row))));
+  }
+  static double ratio(const JointDamping& damper, double step, double inertia) { return step * damper.coefficient / inertia; }
+  static bool on_ball(const JointDamping& damper, const LawSetup& setup) { return setup.q_row(damper.row) < 0; }
+  void add(const StepView<S>& step, JointImpulses<S>& sum) const { damping_map(this->entries(), std::span(share_), step.h, sum); }
+  void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
+    damping_loss(this->entries(), std::span(share_), step.h, solved.delta, solved.before, book);
+  }
+  static void push(const JointDamping& damper, const Instant& now, Field<double>& force) {
+    force(damper.row) -= damper.coefficient * now.v(damper.row);
+  }
+
+ private:
+  std::vector<double> share_;  // s of each
+};
 
 }  // namespace linden

@@ -9,10 +9,12 @@
 // source  quadratic drag: b2 = 1/2 density x drag coefficient x area
 #pragma once
 
+#include <cmath>
 #include <span>
+#include <vector>
 
 #include "kernels/effects/body_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -47,5 +49,39 @@ void drag_map(Drags<S>& drags, std::size_t first, std::size_t last, const BodyCo
     drags.loss(static_cast<Index>(k)) = b * dot(v, moved);
   }
 }
+
+template <class S>
+class DragLaw : public BodyLaw<S, Drag> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::add, "drag_map", "drag, pose, displacement", "impulse, body impulses"}};
+  explicit DragLaw(const LawSetup& setup) : BodyLaw<S, Drag>(setup) {
+    for (const Drag& drag : this->entries()) share_.push_back(begin_share(ratio(drag, setup.step, setup.mass_of(drag.slot))));
+    drags_.entries = this->entries();
+    drags_.share = share_;
+    drags_.wind = {setup.effects.wind[0], setup.effects.wind[1], setup.effects.wind[2]};
+    drags_.loss.allocate(static_cast<Index>(this->entries().size()));
+  }
+  DragLaw(const DragLaw&) = delete;
+  DragLaw& operator=(const DragLaw&) = delete;
+  static std::span<const Drag> touching(const LawSetup& setup) { return setup.effects.drag; }
+  /// A falling body reaches sqrt(m g / b2) at most.
+  static double ratio(const Drag& drag, double step, double mass) {
+    constexpr double kUsualGravity = 9.81;
+    return step * (drag.linear / mass + std::sqrt(drag.quadratic * kUsualGravity / mass));
+  }
+
+  template <class Element>
+  void add(const StepView<S>& step, const BodyConstants<Element>& constants, std::size_t first, std::size_t last,
+           const Field<S, 7>& displacement, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
+    drag_map(drags_, first, last, constants, step.h, displacement, sum, impulse);
+  }
+  void account(const StepView<S>&, const SolvedStep<S>&, const auto& book) const {
+    for (Index k = 0; k < drags_.loss.rows(); ++k) book(drags_.entries[static_cast<std::size_t>(k)].slot, drags_.loss(k));
+  }
+
+ private:
+  Drags<S> drags_;
+  std::vector<double> share_;  // s of each
+};
 
 }  // namespace linden

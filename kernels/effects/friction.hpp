@@ -23,8 +23,7 @@
 
 #include <span>
 
-#include "kernels/effects/joint_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -142,5 +141,42 @@ void friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& re
     each(friction.row, force * worked(1.0, delta(friction.row), before(friction.row)));
   }
 }
+
+template <class S>
+class FrictionLaw : public JointLaw<S, JointFriction> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_friction", "history, delta", "friction, delta"},
+                                     PartSweep{Part::add, "friction_map", "friction", "joint impulses"},
+                                     PartSweep{Part::revise, "revise_friction", "innovation, delta", "friction, delta, joint impulses"}};
+  static constexpr bool kFollows = true;
+  explicit FrictionLaw(const LawSetup& setup) : JointLaw<S, JointFriction>(setup) {
+    frictions_.entries = this->entries();
+    for (Field<S>* field : {&frictions_.mode, &frictions_.force}) field->allocate(static_cast<Index>(this->entries().size()));
+    for (Index k = 0; k < frictions_.force.rows(); ++k) frictions_.force(k) = as<S>(this->entries()[static_cast<std::size_t>(k)].force);
+  }
+
+  void begin(const StepView<S>&, const StepStart<S>& start, Field<S>& delta) {
+    begin_friction(frictions_, start.before, start.known, delta);
+  }
+  void add(const StepView<S>& step, JointImpulses<S>& sum) const {
+    friction_map(frictions_, step.h, step.creep, sum);
+    if (step.creep == 0) hold_friction(frictions_, sum);
+  }
+  S overload(const StepView<S>& step, const Field<S>& residual) const { return friction_overload(frictions_, step.h, residual); }
+  MaskOf<S> revise(const StepView<S>& step, const Revision<MaskOf<S>>& now, const S& least, const Field<S>& residual, Field<S>& delta) {
+    return revise_friction(frictions_, step.h, residual, now.near, least, delta);
+  }
+  void follow(const StepView<S>& step, const Field<S>& delta) { guess_friction(frictions_, step.h, step.creep, delta); }
+  void soften(double factor, Field<S>& delta) const { shrink_friction(frictions_, factor, delta); }
+  void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
+    friction_loss(frictions_, step.h, solved.residual, solved.delta, solved.before, book);
+  }
+
+  /// Force of each, to be written between steps.
+  Field<S>& forces() { return frictions_.force; }
+
+ private:
+  Frictions<S> frictions_;
+};
 
 }  // namespace linden

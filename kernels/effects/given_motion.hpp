@@ -14,10 +14,11 @@
 // source  constraints of a discrete Euler-Lagrange equation: Marsden, West, Discrete mechanics and variational integrators (2001), 3.4
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <span>
 
-#include "kernels/effects/joint_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -82,5 +83,57 @@ S motion_work(const GivenMotions<S>& motions, const S& h, const Field<S>& residu
   }
   return sum;
 }
+
+/// Where within a step the velocity of a given motion is that with which it comes to the end: but for the rounding of times, there.
+inline constexpr double kComing = 1 - 1e-6;
+
+template <class S>
+class MotionLaw : public JointLaw<S, JointMotion> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::begin, "given_motion_map", "motions, time, q", "delta"}};
+  explicit MotionLaw(const LawSetup& setup) : JointLaw<S, JointMotion>(setup), curves_(setup.curves) {
+    motions_.entries = this->entries();
+    for (Field<S>* field : {&motions_.end, &motions_.next_velocity, &motions_.velocity, &motions_.force, &motions_.steady}) {
+      field->allocate(static_cast<Index>(this->entries().size()));
+    }
+  }
+
+  void begin(const StepView<S>& step, const StepStart<S>& start, Field<S>& delta) {
+    begin_motions(step.h, start.known, motions_);
+    for (Index k = 0; k < motions_.end.rows(); ++k) {
+      const SmoothCurve& curve = curves_[static_cast<std::size_t>(k)];
+      motions_.end(k) = at_each_time<S>(start.times, [&](double t) LINDEN_INLINE_LAMBDA { return curve.at(t + start.step); });
+      motions_.next_velocity(k) =
+          at_each_time<S>(start.times, [&](double t) LINDEN_INLINE_LAMBDA { return curve.slope(t + kComing * start.step); });
+    }
+    put(step, delta);
+  }
+  /// What is given stays where a guess is given up for another.
+  void put(const StepView<S>& step, Field<S>& delta) const { given_motion_map(motions_, step.q_row, step.q, delta); }
+  void add(const StepView<S>&, JointImpulses<S>& sum) const { hold_motions(motions_, sum); }
+  void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
+    book(-1, motion_work(motions_, step.h, solved.residual, solved.delta, solved.before));
+  }
+  void keep(const Field<S>& residual) { end_motions(residual, motions_); }
+
+  KeptNumbers<S, 3> memory() { return {motions_.velocity.flat(), motions_.force.flat(), motions_.steady.flat()}; }
+  /// Velocities, steady forces and forces, each of all motions.
+  static Index kept_numbers(const LawSetup& setup) { return 3 * static_cast<Index>(setup.curves.size()); }
+  S kept(Index k) const { return (*std::array{&motions_.velocity, &motions_.steady, &motions_.force}[which(k)])(k % motions_.end.rows()); }
+  void set_kept(Index k, const S& number) {
+    (*std::array{&motions_.velocity, &motions_.steady, &motions_.force}[which(k)])(k % motions_.end.rows()) = number;
+  }
+  void forget() {
+    for (Field<S>* field : {&motions_.velocity, &motions_.force, &motions_.steady}) std::ranges::fill(field->flat(), S(0.0));
+  }
+
+  const GivenMotions<S>& motions() const { return motions_; }
+
+ private:
+  std::size_t which(Index k) const { return static_cast<std::size_t>(k / motions_.end.rows()); }
+
+  GivenMotions<S> motions_;
+  std::span<const SmoothCurve> curves_;
+};
 
 }  // namespace linden

@@ -137,4 +137,32 @@ void limit_loss(const Limits<S>& limits, const S& h, const Field<S>& residual, c
   }
 }
 
+template <class S>
+class LimitsLaw : public JointLaw<S, JointLimit> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_limits", "q, history, delta", "limits, delta"},
+                                     PartSweep{Part::revise, "revise_limits", "innovation, delta", "limits, delta, joint impulses"}};
+  explicit LimitsLaw(const LawSetup& setup) : JointLaw<S, JointLimit>(setup) {
+    limits_.entries = this->entries();
+    for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) field->allocate(static_cast<Index>(this->entries().size()));
+  }
+
+  void begin(const StepView<S>& step, const StepStart<S>& start, Field<S>& delta) {
+    begin_limits(limits_, step.q_row, step.h, step.q, start.before, start.known, start.passable, delta);
+  }
+  void add(const StepView<S>&, JointImpulses<S>& sum) const { hold_limits(limits_, sum); }
+  /// Limits that do not settle soon are judged at the solution: nearby, what holds a light joint is lost in what the others still lack.
+  MaskOf<S> revise(const StepView<S>&, const Revision<MaskOf<S>>& now, const S&, const Field<S>& residual, Field<S>& delta) {
+    return revise_limits(limits_, residual, now.solved || (now.near && !now.late), now.last, delta);
+  }
+  void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
+    limit_loss(limits_, step.h, solved.residual, solved.delta, solved.before, book);
+  }
+
+  const Limits<S>& limits() const { return limits_; }
+
+ private:
+  Limits<S> limits_;
+};
+
 }  // namespace linden

@@ -15,8 +15,7 @@
 
 #include <span>
 
-#include "kernels/effects/joint_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -30,13 +29,19 @@ void spring_map(std::span<const JointSpring> springs, const Field<Index>& q_row,
 }
 
 template <class S>
-S spring_potential(std::span<const JointSpring> springs, const Field<Index>& q_row, const Field<S>& q) {
-  S sum(0.0);
-  for (const JointSpring& spring : springs) {
-    const S stretch = q(q_row(spring.row)) - as<S>(spring.rest);
-    sum = sum + as<S>(0.5 * spring.stiffness) * stretch * stretch;
+class SpringLaw : public JointLaw<S, JointSpring> {
+ public:
+  using JointLaw<S, JointSpring>::JointLaw;
+  static constexpr std::array sweeps{PartSweep{Part::add, "spring_map", "springs, q", "joint impulses"}};
+  void add(const StepView<S>& step, JointImpulses<S>& sum) const { spring_map(this->entries(), step.q_row, step.h, step.q, sum); }
+  static S potential(const JointSpring& spring, const JointsView<S>& at) {
+    const S stretch = at.q(at.q_row(spring.row)) - as<S>(spring.rest);
+    return as<S>(0.5 * spring.stiffness) * stretch * stretch;
   }
-  return sum;
-}
+  static void push(const JointSpring& spring, const Instant& now, Field<double>& force) {
+    const double stretch = now.q(now.q_row(spring.row)) - spring.rest;
+    force(spring.row) -= spring.stiffness * stretch;
+  }
+};
 
 }  // namespace linden

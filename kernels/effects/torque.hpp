@@ -13,8 +13,7 @@
 
 #include <span>
 
-#include "kernels/effects/joint_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -33,5 +32,26 @@ S torque_work(std::span<const JointTorque> torques, const Field<S>& force, const
   for (Index k = 0; k < force.rows(); ++k) sum = sum + force(k) * delta(torques[static_cast<std::size_t>(k)].row);
   return sum;
 }
+
+template <class S>
+class TorqueLaw : public JointLaw<S, JointTorque> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::add, "torque_map", "torques, time", "joint impulses"}};
+  explicit TorqueLaw(const LawSetup& setup) : JointLaw<S, JointTorque>(setup) { force_.allocate(static_cast<Index>(this->entries().size())); }
+  void begin(const StepView<S>&, const StepStart<S>& start, Field<S>&) {
+    for (Index k = 0; k < force_.rows(); ++k) {
+      const JointTorque& torque = this->entries()[static_cast<std::size_t>(k)];
+      force_(k) = at_each_time<S>(start.times, [&](double t) LINDEN_INLINE_LAMBDA { return torque.force.mean(t, t + start.step); });
+    }
+  }
+  void add(const StepView<S>& step, JointImpulses<S>& sum) const { torque_map(this->entries(), force_, step.h, sum); }
+  void account(const StepView<S>&, const SolvedStep<S>& solved, const auto& book) const {
+    book(-1, torque_work(this->entries(), force_, solved.delta));
+  }
+  static void push(const JointTorque& torque, const Instant& now, Field<double>& force) { force(torque.row) += torque.force.at(now.time); }
+
+ private:
+  Field<S> force_;  // of each, its mean over the step
+};
 
 }  // namespace linden

@@ -14,7 +14,7 @@
 #include <span>
 
 #include "kernels/effects/body_impulses.hpp"
-#include "layout/effects.hpp"
+#include "kernels/effects/law.hpp"
 
 namespace linden {
 
@@ -57,5 +57,34 @@ void wrench_map(Wrenches<S>& wrenches, std::size_t first, std::size_t last, cons
     wrenches.work(static_cast<Index>(k)) = half * (dot(force + end_force, moved) + dot(moment + end_moment, turn));
   }
 }
+
+template <class S>
+class WrenchLaw : public BodyLaw<S, BodyWrench> {
+ public:
+  static constexpr std::array sweeps{PartSweep{Part::add, "wrench_map", "wrenches, pose, displacement", "impulse, body impulses"}};
+  explicit WrenchLaw(const LawSetup& setup) : BodyLaw<S, BodyWrench>(setup) {
+    wrenches_.entries = this->entries();
+    for (Field<S>* field : {&wrenches_.scale, &wrenches_.work}) field->allocate(static_cast<Index>(this->entries().size()));
+  }
+  static std::span<const BodyWrench> touching(const LawSetup& setup) { return setup.effects.wrenches; }
+
+  void begin(const StepStart<S>& start) {
+    for (Index k = 0; k < wrenches_.scale.rows(); ++k) {
+      const BodyWrench& wrench = wrenches_.entries[static_cast<std::size_t>(k)];
+      wrenches_.scale(k) = at_each_time<S>(start.times, [&](double t) LINDEN_INLINE_LAMBDA { return wrench.mean_share(t, t + start.step); });
+    }
+  }
+  template <class Element>
+  void add(const StepView<S>& step, const BodyConstants<Element>&, std::size_t first, std::size_t last, const Field<S, 7>& displacement,
+           BodyImpulses<S>& sum, Field<S, 6>& impulse) {
+    wrench_map(wrenches_, first, last, step.h, displacement, sum, impulse);
+  }
+  void account(const StepView<S>&, const SolvedStep<S>&, const auto& book) const {
+    for (Index k = 0; k < wrenches_.work.rows(); ++k) book(wrenches_.entries[static_cast<std::size_t>(k)].slot, wrenches_.work(k));
+  }
+
+ private:
+  Wrenches<S> wrenches_;
+};
 
 }  // namespace linden

@@ -61,7 +61,7 @@ TEST_CASE("a joint between two limits bounces as the closed form says, at any st
       }
       const double inertia = 0.002 + 0.5 * 0.01;
       CHECK(simulation.energy().kinetic == Approx(0.5 * inertia * v * v).epsilon(1e-9));
-      CHECK(simulation.effect_work().limits == Approx(0.5 * inertia * (4 - v * v)).margin(1e-12));
+      CHECK(simulation.effect_work().of<JointLimit>() == Approx(0.5 * inertia * (4 - v * v)).margin(1e-12));
     }
   }
 }
@@ -91,7 +91,7 @@ TEST_CASE("joints that all bounce elastically keep their energy, with gravity an
         INFO(joints << " joints, gravity " << gravity << ", step " << h);
         CHECK(std::abs(simulation.energy().total() - before) < 2e-2 * kinetic * (h / 5e-4));
         for (const double q : simulation.positions()) CHECK(std::abs(q) < 0.5 + 1e-12);
-        CHECK(std::abs(simulation.effect_work().limits) < 1e-9 * kinetic);
+        CHECK(std::abs(simulation.effect_work().of<JointLimit>()) < 1e-9 * kinetic);
         CHECK(simulation.passive_gifts().empty());
       }
     }
@@ -106,16 +106,16 @@ TEST_CASE("after a blow the velocity is the one after the blow, and its work is 
     simulation.set_velocities(std::vector<double>{0.5, 1.3});
     const double before = simulation.energy().kinetic;
     std::vector<double> last = simulation.velocities();
-    for (int k = 0; simulation.effect_work().limits == 0; ++k) {
+    for (int k = 0; simulation.effect_work().of<JointLimit>() == 0; ++k) {
       last = simulation.velocities();
       REQUIRE(k < 1000);
       run(simulation, 1);
-      CHECK(simulation.energy().kinetic + simulation.effect_work().limits == Approx(before).epsilon(1e-5));
+      CHECK(simulation.energy().kinetic + simulation.effect_work().of<JointLimit>() == Approx(before).epsilon(1e-5));
     }
     CHECK(simulation.velocities()[1] == Approx(-e * last[1]).margin(2e-2 * e + 1e-12));
-    CHECK(simulation.effect_work().limits > 0);
+    CHECK(simulation.effect_work().of<JointLimit>() > 0);
     run(simulation, 200);
-    CHECK(simulation.energy().kinetic + simulation.effect_work().limits == Approx(before).epsilon(1e-5));
+    CHECK(simulation.energy().kinetic + simulation.effect_work().of<JointLimit>() == Approx(before).epsilon(1e-5));
   }
 }
 
@@ -137,7 +137,7 @@ TEST_CASE("a blow leaves no joint faster than its limit of velocity, nor one tha
       const std::vector<double> v = simulation.velocities();
       REQUIRE(std::abs(v[2]) <= 0.3);
       REQUIRE((simulation.positions()[0] > 1e-9 || v[0] >= 0));
-      REQUIRE(simulation.energy().kinetic + simulation.effect_work().limits == Approx(before).epsilon(h / 2e-4 * 1e-3));
+      REQUIRE(simulation.energy().kinetic + simulation.effect_work().of<JointLimit>() == Approx(before).epsilon(h / 2e-4 * 1e-3));
     }
     CHECK(struck);
     CHECK(simulation.passive_gifts().empty());
@@ -160,7 +160,7 @@ TEST_CASE("a step that fails leaves all as it was, a start that was struck and w
   CHECK(std::ranges::equal(simulation.positions(), q));
   CHECK(simulation.velocities() == v);
   CHECK(simulation.energy().total() == energy);
-  CHECK(simulation.effect_work().limits == 0);
+  CHECK(simulation.effect_work().of<JointLimit>() == 0);
 }
 
 TEST_CASE("what bounces ever lower under gravity comes to rest on its limit", "[blows]") {

@@ -175,7 +175,7 @@ TEST_CASE("a joint below its break-away force does not creep, above it slides as
     run(sliding, 1000);
     const double stopped = sliding.positions()[0];
     CHECK(stopped == Approx(speed * std::abs(speed) / (2 * f / mass)).epsilon(0.01));
-    CHECK(sliding.effect_work().friction == Approx(0.5 * mass * speed * speed).epsilon(1e-3));
+    CHECK(sliding.effect_work().of<JointFriction>() == Approx(0.5 * mass * speed * speed).epsilon(1e-3));
     run(sliding, 100);
     CHECK(sliding.positions()[0] == stopped);
   }
@@ -602,7 +602,7 @@ TEST_CASE("a caller changes wrenches and forces from step to step", "[effects]")
     run(pushed, 1);
   }
   CHECK(pushed.momentum().linear[0] == Approx(0.5 * 0.999).epsilon(1e-9));
-  CHECK(pushed.effect_work().wrench == Approx(0.5 * 2 * std::pow(0.5 * 0.999 / 2, 2)).epsilon(1e-3));
+  CHECK(pushed.effect_work().of<BodyWrench>() == Approx(0.5 * 2 * std::pow(0.5 * 0.999 / 2, 2)).epsilon(1e-3));
   CHECK_THROWS_AS(pushed.set_wrench(2, {}, {}), InputError);
   CHECK_THROWS_AS(pushed.set_wrench(1, {0, std::nan(""), 0}, {}), InputError);
 }
@@ -752,8 +752,8 @@ TEST_CASE("conservative effects leave no slope in the energy over 100,000 steps,
   random_start(damped, 3, 0.3);
   const double before = damped.energy().total();
   run(damped, 20000);
-  CHECK(damped.effect_work().damping > 0.01);
-  CHECK(balance(damped) == Approx(before).margin(1e-4 * damped.effect_work().damping));
+  CHECK(damped.effect_work().of<JointDamping>() > 0.01);
+  CHECK(balance(damped) == Approx(before).margin(1e-4 * damped.effect_work().of<JointDamping>()));
 }
 
 TEST_CASE("what the damping of servos takes is taken, not given", "[effects]") {

@@ -97,7 +97,7 @@ TEST_CASE("a push gives a free body its impulse, wherever it begins and ends bet
     CHECK(simulation.momentum().linear[0] == Approx(kMass * kSpeed + impulse).epsilon(1e-13));
     // what is booked is the kinetic energy that it gave
     const double given = 0.5 * std::pow(kMass * kSpeed + impulse, 2) / kMass - before;
-    CHECK(simulation.effect_work().wrench == Approx(given).margin(1e-13 * before));
+    CHECK(simulation.effect_work().of<BodyWrench>() == Approx(given).margin(1e-13 * before));
     CHECK(balance(simulation) == Approx(before).epsilon(1e-13));
   }
 }
@@ -176,8 +176,8 @@ TEST_CASE("the work of pushes that come and go is booked to second order of the 
       run(simulation, 1);
       error[halving] = std::max(error[halving], std::abs(balance(simulation) - before));
     }
-    CHECK(std::abs(simulation.effect_work().torque) > 1e-3);
-    CHECK(std::abs(simulation.effect_work().wrench) > 1e-3);
+    CHECK(std::abs(simulation.effect_work().of<JointTorque>()) > 1e-3);
+    CHECK(std::abs(simulation.effect_work().of<BodyWrench>()) > 1e-3);
   }
   INFO("errors " << error[0] << ", " << error[1]);
   CHECK(error[0] < 1e-4);
@@ -306,8 +306,8 @@ TEST_CASE("a joint goes no faster than its limit of velocity, and what that take
       const double exact = 0.5 * kMost * kReached + kMost * (simulation.time() - kReached);
       CHECK(simulation.positions()[0] == Approx(way * exact).margin(kMost * h));
       const EffectWork& work = simulation.effect_work();
-      CHECK(work.torque == Approx(kTorque * std::abs(simulation.positions()[0])).epsilon(1e-12));
-      CHECK(work.limits == Approx(work.torque - 0.5 * kInertia * kMost * kMost).margin(kTorque * kMost * h));
+      CHECK(work.of<JointTorque>() == Approx(kTorque * std::abs(simulation.positions()[0])).epsilon(1e-12));
+      CHECK(work.of<JointLimit>() == Approx(work.of<JointTorque>() - 0.5 * kInertia * kMost * kMost).margin(kTorque * kMost * h));
     }
   }
 }
@@ -321,7 +321,7 @@ TEST_CASE("a joint that is let go leaves its limit of velocity, and one that sta
   set(simulation, {0}, {3});
   run(simulation, 1);
   CHECK(simulation.positions()[0] == Approx(kMost * 1e-3).epsilon(1e-12));
-  CHECK(simulation.effect_work().limits == Approx(0.5 * kInertia * (9 - kMost * kMost)).epsilon(0.01));
+  CHECK(simulation.effect_work().of<JointLimit>() == Approx(0.5 * kInertia * (9 - kMost * kMost)).epsilon(0.01));
   run(simulation, 299);
   CHECK(simulation.positions()[0] == Approx(kMost * 0.3).epsilon(1e-12));
   run(simulation, 50);
@@ -345,7 +345,7 @@ TEST_CASE("limits of velocity and of position are one joint's together", "[force
   run(falling, 500);
   CHECK(falling.positions()[0] == Approx(-0.2).margin(1e-12));
   // the weight's work is all that there was to take
-  CHECK(falling.effect_work().limits == Approx(2 * 9.81 * 0.2).margin(2 * 9.81 * 0.8 * 1e-3));
+  CHECK(falling.effect_work().of<JointLimit>() == Approx(2 * 9.81 * 0.2).margin(2 * 9.81 * 0.8 * 1e-3));
 
   effects.limits = {{.row = 0, .velocity = 0}};
   Simulation locked(one_joint(JointType::prismatic, 2, 0.01), {.gravity = {0, -9.81, 0}}, effects);
@@ -370,8 +370,8 @@ TEST_CASE("every joint of a falling chain keeps to its limit of velocity, and th
       REQUIRE(moved <= most * (1 + 1e-9));
       held += moved >= most * (1 - 1e-9) ? 1 : 0;
     }
-    REQUIRE(simulation.effect_work().limits >= taken - 1e-12);
-    taken = simulation.effect_work().limits;
+    REQUIRE(simulation.effect_work().of<JointLimit>() >= taken - 1e-12);
+    taken = simulation.effect_work().of<JointLimit>();
     last.assign(simulation.positions().begin(), simulation.positions().end());
   }
   CHECK(held > 100);

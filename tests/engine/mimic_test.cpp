@@ -83,8 +83,9 @@ void check_against_twin(const Make& effects, double speed, int steps) {
             Approx(slides.multiplier * pair.positions()[static_cast<std::size_t>(leader)] + slides.offset).epsilon(0).margin(1e-15));
       worst = std::max(worst, std::abs(pair.velocities()[static_cast<std::size_t>(leader)] - twin.velocities()[0]));
       const EffectWork&a = pair.effect_work(), &b = twin.effect_work();
-      for (const double more : {pair.energy().total() - twin.energy().total(), a.damping - b.damping, a.friction - b.friction,
-                                a.limits - b.limits, a.servo - b.servo, a.torque - b.torque}) {
+      for (const double more : {pair.energy().total() - twin.energy().total(), a.of<JointDamping>() - b.of<JointDamping>(),
+                                a.of<JointFriction>() - b.of<JointFriction>(), a.of<JointLimit>() - b.of<JointLimit>(),
+                                a.of<Servo>() - b.of<Servo>(), a.of<JointTorque>() - b.of<JointTorque>()}) {
         worst = std::max(worst, std::abs(more) / slides.inertia());
       }
     }
@@ -107,7 +108,7 @@ TEST_CASE("a force on a coordinate meets the inertia of all that it moves", "[mi
     CHECK(simulation.positions()[leader] == Approx(q).epsilon(1e-11));
     CHECK(simulation.velocities()[leader] == Approx(2 * q).epsilon(1e-11));
     CHECK(simulation.energy().kinetic == Approx(0.7 * q).epsilon(1e-11));
-    CHECK(simulation.effect_work().torque == Approx(0.7 * q).epsilon(1e-11));
+    CHECK(simulation.effect_work().of<JointTorque>() == Approx(0.7 * q).epsilon(1e-11));
   }
 }
 
@@ -190,13 +191,13 @@ TEST_CASE("friction on a leader bears the weight of its follower, as far as it c
       const double q = simulation.positions()[static_cast<std::size_t>(leader)];
       if (share > 1) {
         CHECK(q == 0);
-        CHECK(simulation.effect_work().friction == 0);
+        CHECK(simulation.effect_work().of<JointFriction>() == 0);
         continue;
       }
       // from the first step that slides on, whose friction acts at its beginning
       const double acceleration = (1 - share) * weight / slides.inertia();
       CHECK(q == Approx(0.5 * acceleration).epsilon(5 * kStep));
-      CHECK(simulation.effect_work().friction == Approx(share * std::abs(weight * q)).epsilon(5 * kStep));
+      CHECK(simulation.effect_work().of<JointFriction>() == Approx(share * std::abs(weight * q)).epsilon(5 * kStep));
     }
   }
 }
@@ -217,14 +218,14 @@ TEST_CASE("a coordinate stops at its limit, and the limit takes its energy once"
         const double energy = 0.5 * slides.inertia();
         CHECK(simulation.energy().kinetic == Approx(energy).epsilon(1e-13));
         run(simulation, 299);
-        CHECK(simulation.effect_work().limits == Approx(0).margin(1e-13));
+        CHECK(simulation.effect_work().of<JointLimit>() == Approx(0).margin(1e-13));
         run(simulation, 4);  // the step that ends on the limit and the one that stays there
         CHECK(simulation.positions()[leader] == Approx(speed * upper).epsilon(1e-14));
-        CHECK(simulation.effect_work().limits == Approx(energy).epsilon(1e-12));
+        CHECK(simulation.effect_work().of<JointLimit>() == Approx(energy).epsilon(1e-12));
         CHECK(simulation.energy().kinetic == Approx(0).margin(1e-20));
         run(simulation, 500);
         CHECK(simulation.positions()[leader] == Approx(speed * upper).epsilon(1e-14));
-        CHECK(simulation.effect_work().limits == Approx(energy).epsilon(1e-12));
+        CHECK(simulation.effect_work().of<JointLimit>() == Approx(energy).epsilon(1e-12));
       }
     }
   }
@@ -245,12 +246,12 @@ TEST_CASE("a coordinate that falls on its limit rests there, and the limit takes
     const double start = simulation.energy().total();
     run(simulation, 3000);
     CHECK(simulation.positions()[leader] == Approx(end).epsilon(1e-14));
-    const double taken = simulation.effect_work().limits, fallen = std::abs(weight * end);
+    const double taken = simulation.effect_work().of<JointLimit>(), fallen = std::abs(weight * end);
     CHECK(start - simulation.energy().potential == Approx(fallen).epsilon(1e-12));
     // but for what the load gives in a step to what is at rest
     CHECK(taken == Approx(fallen).margin(0.5 * weight * weight * kStep * kStep / slides.inertia()));
     run(simulation, 100);
-    CHECK(simulation.effect_work().limits == taken);
+    CHECK(simulation.effect_work().of<JointLimit>() == taken);
   }
 }
 

@@ -130,7 +130,7 @@ TEST_CASE("What hangs on a joint that is moved swings as it must, to second orde
       CHECK(simulation.velocities()[0] == Approx(kSize * kRate * std::cos(kRate * simulation.time())).margin(20 * h * h));
     }
     error[level] = std::abs(simulation.positions()[1] + expected);  // about y a rope that swings forward turns the other way
-    CHECK(simulation.effect_work().motion != 0);
+    CHECK(simulation.effect_work().of<JointMotion>() != 0);
   }
   CHECK(error[1] < 0.3 * error[0]);
   CHECK(error[2] < 0.3 * error[1]);
@@ -155,7 +155,7 @@ TEST_CASE("A joint that is held in place is a fixed one") {
     CHECK(held.velocities()[0] == 0);
     CHECK(held.velocities()[1] == Approx(free.velocities()[0]).margin(1e-8));
   }
-  CHECK(std::abs(held.effect_work().motion) < 1e-12);
+  CHECK(std::abs(held.effect_work().of<JointMotion>()) < 1e-12);
   CHECK(held.energy().total() == Approx(free.energy().total()).epsilon(1e-9));
 }
 
@@ -205,8 +205,8 @@ TEST_CASE("A motion that begins and ends at speed is a blow, with its work booke
     }
     CHECK(simulation.positions()[0] == 0.6);
     CHECK(simulation.velocities()[0] == 0);
-    CHECK(simulation.effect_work().motion > 0.1);  // what the bob is left with
-    CHECK(stray[fine] < 1e-3 * simulation.effect_work().motion);
+    CHECK(simulation.effect_work().of<JointMotion>() > 0.1);  // what the bob is left with
+    CHECK(stray[fine] < 1e-3 * simulation.effect_work().of<JointMotion>());
   }
   CHECK(stray[1] < 0.6 * stray[0]);  // first order: a blow acts along the mean of two displacements, between which bodies turn
 }

@@ -11,10 +11,10 @@ namespace {
 
 EffectAccount step(double friction, double ground, double kinetic = 1) {
   EffectAccount account;
-  account.work.friction = friction;
-  account.work.ground = ground;
-  account.friction.see(1, friction);
-  account.ground.see(2, ground);
+  account.work.of<JointFriction>() = friction;
+  account.work.of<Ground>() = ground;
+  account.least[kListOf<JointFriction>].see(1, friction);
+  account.least[kListOf<Ground>].see(2, ground);
   account.kinetic = kinetic;
   return account;
 }
@@ -56,7 +56,7 @@ TEST_CASE("drag gives where there is a wind, and may not in still air") {
   Effects windy;
   windy.wind = {1, 0, 0};
   EffectAccount account;
-  account.work.drag = -1;
+  account.work.of<Drag>() = -1;
   account.kinetic = 0.1;
   for (const bool wind : {false, true}) {
     PassiveWatch watch(model, wind ? windy : Effects{});

@@ -248,8 +248,8 @@ TEST_CASE("a run records what it is asked for, in tables and arrays alike, and a
     CHECK(table.at("force." + joint).at(k) == simulation.joint_forces()[1]);
     CHECK(table.at("energy.kinetic").at(k) == simulation.energy().kinetic);
     CHECK(table.at("energy.gravity").at(k) == simulation.energy().potential);
-    CHECK(table.at("energy.damping_taken").at(k) == simulation.effect_work().damping);
-    CHECK(table.at("energy.servo_given").at(k) == simulation.effect_work().servo);
+    CHECK(table.at("energy.damping_taken").at(k) == simulation.effect_work().of<JointDamping>());
+    CHECK(table.at("energy.servo_given").at(k) == simulation.effect_work().of<Servo>());
   }
   const std::size_t nv = arm.names.velocity.size();
   CHECK(table.size() == 2 + 3 * nv + 1 + 4);

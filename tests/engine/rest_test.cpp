@@ -116,7 +116,7 @@ TEST_CASE("a push of any number of steps leaves its impulse", "[rest]") {
       run(simulation, 30);
       INFO(force << " N for " << pushed << " steps");
       CHECK(simulation.velocities()[3] == Approx(1e-3 * pushed * force).epsilon(1e-9));
-      CHECK(simulation.effect_work().wrench == Approx(0.5 * std::pow(1e-3 * pushed * force, 2)).epsilon(1e-9));
+      CHECK(simulation.effect_work().of<BodyWrench>() == Approx(0.5 * std::pow(1e-3 * pushed * force, 2)).epsilon(1e-9));
     }
   }
 }

@@ -649,7 +649,7 @@ TEST_CASE("values that make no sense are refused where they stand", "[scene]") {
   refused("effects: {gravity: -9.81}\n", {"effects.gravity is \"-9.81\"", "[x, y, z]"});
   refused("effects: {gravity: [0, 0]}\n", {"a list of 2"});
   refused("effects: {gravity: [0, 0, x]}\n", {"effects.gravity[2] is \"x\""});
-  refused("effects: {armature: urdf}\n", {"URDF files say nothing of rotors"});
+  refused("effects: {armature: urdf}\n", {"URDF files say nothing of armature"});
   refused("effects: {armature: -1}\n", {"zero or more"});
   refused("effects: {damping: udrf}\n", {"expected urdf, a number or {joint: number}"});
   refused("effects: {damping: {joint1: -1}}\n", {"effects.damping.joint1 is \"-1\"", "zero or more"});

@@ -3,8 +3,8 @@
 #include <cstring>
 #include <limits>
 
-#include "tests/engine/folder.hpp"
 #include "models/build/builder.hpp"
+#include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace linden {

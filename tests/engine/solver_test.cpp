@@ -1,8 +1,8 @@
 // The solve of a step: iterations, methods, first guesses, and what happens when it fails.
 #include <cmath>
 
-#include "tests/engine/scenes.hpp"
 #include "models/build/builder.hpp"
+#include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"
 
 namespace linden {

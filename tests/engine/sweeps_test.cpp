@@ -39,9 +39,10 @@ TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no ot
     return some;
   };
   CHECK_FALSE(EffectPlan(model, options, {}).any());
-  Effects armature, spring, damping, friction, limits, servo, limited, torque, drag, wrench, ground, empty_ground;
+  Effects armature, spring, dead_zone, damping, friction, limits, servo, limited, torque, drag, wrench, ground, empty_ground;
   armature.armature = {{.row = 0, .inertia = 1}};
   spring.springs = {{.row = 0, .stiffness = 1}};
+  dead_zone.dead_zone_springs = {{.row = 0, .stiffness = 1, .half_width = 0.1}};
   damping.damping = {{.row = 0, .coefficient = 1}};
   friction.friction = {{.row = 0, .force = 1}};
   limits.limits = {{.row = 0, .lower = 0}};
@@ -55,6 +56,7 @@ TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no ot
   empty_ground.ground = Ground{};
   check_added(armature, with({"armature_map"}, joint));
   check_added(spring, with({"spring_map"}, joint));
+  check_added(dead_zone, with({"begin_dead_zones", "dead_zone_map", "revise_dead_zones"}, joint));
   check_added(damping, with({"damping_map"}, joint));
   check_added(friction, with({"begin_friction", "friction_map", "revise_friction"}, joint));
   check_added(limits, with({"begin_limits", "revise_limits"}, joint));
@@ -73,6 +75,7 @@ TEST_CASE("every sweep of a schedule is measured under its name") {
   Effects everything;
   everything.armature = {{.row = 0, .inertia = 1}};
   everything.springs = {{.row = 0, .stiffness = 1}};
+  everything.dead_zone_springs = {{.row = 0, .stiffness = 1, .half_width = 0.1}};
   everything.ball_springs = {{.slot = 2, .stiffness = 1}};
   everything.damping = {{.row = 0, .coefficient = 1}};
   everything.friction = {{.row = 0, .force = 1}};

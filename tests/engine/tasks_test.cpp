@@ -142,7 +142,7 @@ TEST_CASE("a rope hangs from a point that moves", "[task]") {
       seen.swing = std::max(seen.swing, std::abs(crane.positions()[top]));
     }
     seen.rail = crane.positions()[rail];
-    seen.given = crane.effect_work().motion;
+    seen.given = crane.effect_work().of<JointMotion>();
     return seen;
   };
   const Ride coarse = ride(2e-3), fine = ride(1e-3);

@@ -203,8 +203,8 @@ double stops_leave(const EverydayScene& scene, const Walk& walk) {
   for (std::size_t k = 1; k < walk.nodes.size(); ++k) {
     const Node &before = walk.nodes[k - 1], &now = walk.nodes[k];
     const double turn = scene.options.step * std::max(size_of(*scene.model, before.v), size_of(*scene.model, now.v));
-    limits += std::abs(now.work.limits - before.work.limits) * std::min(1.0, turn);
-    ground = std::max(ground, std::abs(now.work.ground - before.work.ground));
+    limits += std::abs(now.work.of<JointLimit>() - before.work.of<JointLimit>()) * std::min(1.0, turn);
+    ground = std::max(ground, std::abs(now.work.of<Ground>() - before.work.of<Ground>()));
   }
   return limits + ground;
 }
@@ -213,7 +213,7 @@ double stops_leave(const EverydayScene& scene, const Walk& walk) {
 double motion_leaves(const Walk& walk) {
   double most = 0;
   for (std::size_t k = 2; k < walk.nodes.size(); ++k) {
-    const auto work = [&](std::size_t node) { return walk.nodes[node].work.motion - walk.nodes[node - 1].work.motion; };
+    const auto work = [&](std::size_t node) { return walk.nodes[node].work.of<JointMotion>() - walk.nodes[node - 1].work.of<JointMotion>(); };
     most = std::max(most, std::abs(work(k) - work(k - 1)));
   }
   return 2 * most;
@@ -284,12 +284,12 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
                           "{:.3g} J)",
                           at(scene, where), walk.nodes[where].balance() - first, allowed, scale));
   }
-  const auto gives = [&](const char* effect, double EffectWork::* taken, bool there) {
+  const auto gives = [&]<class Entry>(const char* effect, bool there) {
     if (!there) return;
     double peak = 0, drop = 0;
     std::size_t place = 0;
     for (std::size_t k = 0; k < walk.nodes.size(); ++k) {
-      const double now = walk.nodes[k].work.*taken;
+      const double now = walk.nodes[k].work.of<Entry>();
       peak = std::max(peak, now);
       if (!(peak - now <= drop)) {
         drop = peak - now;
@@ -302,11 +302,11 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
                             drop, allowed, scale));
     }
   };
-  gives("damping", &EffectWork::damping, !scene.effects.damping.empty());
-  gives("friction", &EffectWork::friction, !scene.effects.friction.empty());
-  gives("a limit", &EffectWork::limits, !scene.effects.limits.empty());
-  gives("drag", &EffectWork::drag, !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
-  gives("ground", &EffectWork::ground, scene.effects.ground.has_value());
+  gives.operator()<JointDamping>("damping", !scene.effects.damping.empty());
+  gives.operator()<JointFriction>("friction", !scene.effects.friction.empty());
+  gives.operator()<JointLimit>("a limit", !scene.effects.limits.empty());
+  gives.operator()<Drag>("drag", !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
+  gives.operator()<Ground>("ground", scene.effects.ground.has_value());
 }
 
 namespace {

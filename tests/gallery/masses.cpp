@@ -1,8 +1,8 @@
 // Masses and inertias of all sizes beside each other.
 #include <cmath>
 
-#include "models/build/generators.hpp"
 #include "models/build/builder.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/gallery/models.hpp"
 #include "models/build/builder.hpp"
+#include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 
 namespace linden {

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/build/generators.hpp"
 #include "models/build/builder.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 

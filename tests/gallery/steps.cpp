@@ -4,8 +4,8 @@
 #include <functional>
 #include <numbers>
 
-#include "models/build/generators.hpp"
 #include "models/build/builder.hpp"
+#include "models/build/generators.hpp"
 #include "tests/gallery/models.hpp"
 #include "tests/gallery/scenario.hpp"
 #include "tests/reference/closed_forms.hpp"

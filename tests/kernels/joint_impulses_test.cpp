@@ -346,11 +346,12 @@ TEST_CASE("a ball joint's spring pulls as its potential falls") {
         q(3) = r.w;
       };
       put(at * M.r);
-      const double potential_after = ball_spring_potential<double>(springs, model.tree, q);
+      const Field<Index> no_rows;
+      const double potential_after = BallSpringLaw<double>::potential(springs[0], {q, no_rows, model.tree});
       put(at);
       store(motion, 1, M);
       store3(delta, 0, u);
-      const double gained = potential_after - ball_spring_potential<double>(springs, model.tree, q);
+      const double gained = potential_after - BallSpringLaw<double>::potential(springs[0], {q, no_rows, model.tree});
       const double error = std::abs(gained - dot(ball_pull<double>(springs[0], model.tree, q, motion).tau, u));
       CHECK(error < 6 * size * size * size);
       if (before_error > 1e-12) CHECK(error < before_error / 6);
@@ -364,7 +365,7 @@ TEST_CASE("a ball joint's spring pulls as its potential falls") {
         const Displacement<double> between = turned(-first) * M * turned(last);
         const auto half = turned(0.5 * log(between).w);
         put(at * turned(first).r * half.r);
-        return ball_spring_potential<double>(springs, model.tree, q);
+        return BallSpringLaw<double>::potential(springs[0], {q, no_rows, model.tree});
       };
       const Vec3<double> axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, none{0, 0, 0};
       constexpr double kMove = 1e-4;

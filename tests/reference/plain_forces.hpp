@@ -85,6 +85,10 @@ class PlainForces {
       const PlainBody& body = tree_->body(spring.slot);
       Q.segment<3>(body.v) += ball_spring_torque(spring, q.segment<4>(body.q));
     }
+    for (const DeadZoneSpring& spring : effects_->dead_zone_springs) {
+      const double x = position(q, spring.row) - spring.rest;
+      Q[spring.row] -= spring.stiffness * (x - std::clamp(x, -spring.half_width, spring.half_width));
+    }
     for (const JointDamping& damper : effects_->damping) Q[damper.row] -= damper.coefficient * v[damper.row];
     for (const Servo& servo : effects_->servos) {
       if (is_row(servo) && !limited) continue;

@@ -104,6 +104,10 @@ class PlainScene {
     for (const JointSpring& spring : fixed_->effects.springs) {
       sum += half_square(spring.stiffness, fixed_->forces.position(q, spring.row) - spring.rest);
     }
+    for (const DeadZoneSpring& spring : fixed_->effects.dead_zone_springs) {
+      const double x = fixed_->forces.position(q, spring.row) - spring.rest;
+      sum += half_square(spring.stiffness, x - std::clamp(x, -spring.half_width, spring.half_width));
+    }
     for (const BallSpring& spring : fixed_->effects.ball_springs) {
       if (spring.stiffness > 0) {
         const Vector3d torque = ball_spring_torque(spring, q.segment<4>(tree().body(spring.slot).q));

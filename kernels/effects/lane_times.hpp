@@ -1,4 +1,4 @@
-// engine/effects/lane_times.hpp
+// kernels/effects/lane_times.hpp
 // What goes by the time of an instance, where a Scalar holds several of them, each at its own.
 #pragma once
 
