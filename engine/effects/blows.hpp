@@ -4,7 +4,7 @@
 //   v_n <- -e v_n,    p <- p + lambda e_n,    lambda = -(1 + e) v_n / (M^-1)_nn          Newton's law of impact
 //
 // What a blow makes faster than its limit of velocity is stopped at that: v_n <- that limit. v is the velocity that motion and momenta
-// agree on (velocity.md). Several joints at once are struck one after the other, the fastest first, until none
+// agree on (engine/VELOCITY.md). Several joints at once are struck one after the other, the fastest first, until none
 // moves into its limit: each blow keeps or loses energy, so all do. Without restitution, or below kLeastBounce, e is 0.
 //
 // A step in which a joint with restitution meets its limit is cut there: its length is found by false position (Illinois) on how far the

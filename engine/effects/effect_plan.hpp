@@ -41,7 +41,7 @@ struct EffectPlan {
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
   bool bounces = false;  // some limit has a restitution
   bool revises = false;  // what acts is settled within the solve: some effect has states
-  bool bends = false;    // velocities are held to how the motion bends (velocity.md): something revises, or acts more at the beginning of a step
+  bool bends = false;    // velocities are held to how the motion bends (engine/VELOCITY.md): something revises, or acts more at the beginning of a step
   bool any() const { return joints || bodies; }
 
   Field<Index> q_row;               // position row of a screw's velocity row
