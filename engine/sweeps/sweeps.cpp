@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <array>
 
-#include "kernels/effects/laws.hpp"
-
 #include "engine/effects/effect_plan.hpp"
 #include "engine/sweeps/strategy.hpp"
+#include "kernels/effects/laws.hpp"
 
 namespace linden {
-
 namespace {
 
-/// What a part of a law is called in the schedule: add belongs to the beginning of the step for joints, to each evaluation for bodies.
+/// When a sweep runs. The rows of joints are made when a step begins, those of bodies at each evaluation.
 constexpr std::string_view first = "first", evaluation = "evaluation", factor = "factor", correction = "correction", last = "last";
 
 /// Sweeps of the laws that have anything to do, as far as they are this part.
