@@ -43,6 +43,15 @@ set(linden_public_headers
   models/shapes/contacts_of.hpp
   models/urdf/urdf.hpp)
 
+# and the values of every effect
+get_filename_component(linden_root ${CMAKE_CURRENT_LIST_DIR} DIRECTORY)
+set(looks_again CONFIGURE_DEPENDS)
+if(CMAKE_SCRIPT_MODE_FILE)
+  set(looks_again)  # a script is not configured
+endif()
+file(GLOB linden_effect_values RELATIVE ${linden_root} ${looks_again} ${linden_root}/layout/effects/*.hpp)
+list(APPEND linden_public_headers ${linden_effect_values})
+
 # cmake -D from=SOURCE -D to=FOLDER -P engine/public_headers.cmake: makes the copies, and leaves alone those that are as they should be
 if(CMAKE_SCRIPT_MODE_FILE STREQUAL CMAKE_CURRENT_LIST_FILE)
   foreach(header IN LISTS linden_public_headers)

@@ -8,9 +8,10 @@
 #include "engine/baseline/baseline.hpp"
 #include "engine/batch.hpp"
 #include "engine/scene/scene_file.hpp"
-#include "folder.hpp"
 #include "layout/support/input_error.hpp"
-#include "scenes.hpp"
+#include "models/build/builder.hpp"
+#include "tests/engine/folder.hpp"
+#include "tests/engine/scenes.hpp"
 #include "tests/reference/plain_scene.hpp"
 
 namespace linden {
@@ -126,9 +127,7 @@ TEST_CASE("instances of a batch move as simulations do, each in its own piece of
   const auto model = std::make_shared<const Model>(chain(3));
   Effects effects;
   effects.dead_zone_springs = {{.row = 0, .stiffness = 2, .half_width = 0.1, .rest = -0.2}, {.row = 2, .stiffness = 1, .half_width = 0.3}};
-  BatchOptions options;
-  options.step = 1e-3;
-  Batch batch(model, 9, options, effects);
+  Batch batch(model, 9, {.step = 1e-3}, effects);
   const auto start = [](std::int64_t i) { return std::vector{0.1 * static_cast<double>(i) - 0.4, 0.2, -0.1 * static_cast<double>(i)}; };
   const std::vector<double> still(3, 0.0);
   for (std::int64_t i = 0; i < batch.size(); ++i) batch.reset(i, start(i), still);
