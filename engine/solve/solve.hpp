@@ -17,6 +17,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "engine/solve/decide.hpp"
 #include "engine/solve/judge.hpp"
@@ -78,7 +79,9 @@ class Solve {
 
   /// What happens next to each lane.
   std::array<Lanes, kNexts> decided(Lanes active) {
-    const Lanes usable = L::bits(linden::usable(now_)), fell = L::bits(now_.norm < before_), whole = corrected_ & ~cut_;
+    const Lanes usable = L::bits(linden::usable(now_));
+    now_.norm = select(L::mask(usable), now_.norm, as<S>(std::numeric_limits<double>::infinity()));
+    const Lanes fell = L::bits(now_.norm < before_), whole = corrected_ & ~cut_;
     slow_ = (slow_ & ~whole) | (whole & ~L::bits(fell_fast(now_.norm, before_)));
     const Lanes converged = usable & sweeps_.converged(now_);
     const Lanes at_floor = floor(active & usable & ~converged, whole), solved = converged | at_floor;
@@ -124,7 +127,7 @@ class Solve {
       if (updates >= policy_.one_limit_at_a_time) last |= 1u << l;
     }
     if (lanes == 0) return 0;
-    const Lanes near = solved | (L::bits(within(now_.norm, as<S>(kSettled * kSettled), now_.scale)) & L::bits(linden::usable(now_)));
+    const Lanes near = solved | L::bits(within(now_.norm, as<S>(kSettled * kSettled), now_.scale));
     return lanes & sweeps_.revise({L::mask(near), L::mask(solved), L::mask(late), L::mask(last)});
   }
 
