@@ -1,9 +1,10 @@
 // engine/solve/tree_stepper.hpp
-// The steps of a tree. What is run is in tree_sweeps.hpp; what counts as solved, and what to do where it is not, is here.
+// The steps of a tree that is stepped alone. What is run is in tree_sweeps.hpp, how its equation is solved in tree_solve.hpp; what becomes of a
+// solution, and what to do where there is none, is here.
 //
 //   momentum_target     h (p + h/2 Q)
 //   first guess         delta; both on the way down of the first evaluation where nothing else needs them before
-//   +-> motion_map      M = exp(S delta)
+//   +-> motion_map      M = exp(S delta)                        solve.hpp: until decide.hpp says that it is over
 //   |   displacement_down, momentum_map                         DRNEA, downward half
 //   |   newton_factor_up (where that of an earlier step does not serve: held_factor.hpp) or articulated_inertia_up (riqn)
 //   |   innovation_up (or residual_up, impulse_pass_up)         DRNEA, upward half: h r(delta); its energy norm: usable? converged?
