@@ -91,9 +91,9 @@ struct Bench {
     const auto none = h < S(0.0);
     motion_map(tree, constants, work.delta, work.motion);
     const Vec3<S> g = gravity();
-    advance_down(tree, constants, &g, none, work, state.q);
+    advance_down<true>(tree, constants, g, none, work, state.q);
     const Field<S>* const nothing = nullptr;
-    momentum_up(tree, constants, true, h, none, nothing, work, state.p);
+    momentum_up<true>(tree, constants, h, none, nothing, work, state.p);
     // the momentum that makes this displacement nearly the solution
     start_down(tree, constants, work);
     impulse_up(tree, constants, work.placement, work.impulse, work.momentum_target);
@@ -109,11 +109,11 @@ struct Bench {
   void check() { innovation_up(model.tree, constants, work); }
   void advance() {
     const Vec3<S> g = gravity();
-    advance_down(model.tree, constants, &g, h < S(0.0), work, state.q);
+    advance_down<true>(model.tree, constants, g, h < S(0.0), work, state.q);
   }
   void momentum() {
     const Field<S>* const nothing = nullptr;
-    momentum_up(model.tree, constants, true, h, h < S(0.0), nothing, work, state.p);
+    momentum_up<true>(model.tree, constants, h, h < S(0.0), nothing, work, state.p);
   }
 };
 

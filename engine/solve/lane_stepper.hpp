@@ -13,6 +13,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "engine/solve/block_stepper.hpp"
@@ -89,8 +90,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     return lanes;
   }
 
-  void first_guess(const Block<Real>& block, Lanes alive) {
-    const Lanes extrapolates = known(block);
+  void first_guess(const Block<Real>& block, Lanes alive, Lanes extrapolates) {
     for (Index row = 0; row < tree_.shape.velocities; ++row) work_.delta(row) = extrapolated(block, row);
     if ((alive & ~extrapolates) == 0) return;
     // no displacement is known yet: h M^-1 (p + h/2 Q)
@@ -102,28 +102,24 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   /// Returns the lanes still alive.
   Lanes step_once(const Block<Real>& block, Lanes alive) {
     sweeps_.find_target();
-    Solved<Pack> solved;
-    if (model_.mimics.empty()) {
-      first_guess(block, alive);
-      Solve solve(sweeps_, kEffects ? kBlockWithEffects : kSmoothBlock);
-      solved = solve.run(alive, sweeps_.start(block), 0);
-      for (int l = 0; l < block.count; ++l) {
-        if ((alive >> l & 1u) != 0) block.instances[l].evaluations += solved.evaluations[static_cast<std::size_t>(l)];
-      }
-    } else {
-      solved.lost = alive;  // joints that are tied are stepped alone
-    }
-    return finish(block, alive, solved);
+    if (!model_.mimics.empty()) return finish(block, alive, 0, alive);  // joints that are tied are stepped alone
+    const Lanes extrapolates = known(block);
+    first_guess(block, alive, extrapolates);
+    Solve solve(sweeps_, kEffects ? kBlockWithEffects : kSmoothBlock);
+    const Solved<Pack> solved = solve.run(alive, sweeps_.start(block), 0);
+    solved.evaluations.each(alive, [&](int l, int evaluations) { block.instances[l].evaluations += evaluations; });
+    displacement_map(tree_, work_.motion, work_.delta);
+    const Lanes doubtful = may_be_another_root(tree_, sweeps_.constants(), solved.done & extrapolates, solved.least_w, work_.delta,
+                                               [&](Index row) { return extrapolated(block, row); });
+    return finish(block, alive, solved.done & ~doubtful, solved.lost | doubtful);
   }
 
-  Lanes finish(const Block<Real>& block, Lanes alive, const Solved<Pack>& solved) {
-    displacement_map(tree_, work_.motion, work_.delta);
-    const Lanes doubtful = may_be_another_root(tree_, sweeps_.constants(), solved.done & known(block), solved.least_w, work_.delta,
-                                               [&](Index row) { return extrapolated(block, row); });
-    const Lanes done = solved.done & ~doubtful, lost = solved.lost | doubtful;
+  /// Takes the step in the lanes that are done, and of those that are lost each alone. Returns the lanes still alive.
+  Lanes finish(const Block<Real>& block, Lanes alive, Lanes done, Lanes lost) {
     Lanes frozen = 0;
-    for (int l = 0; l < W; ++l) {
-      if ((lost >> l & 1u) != 0 && !step_alone(block, l)) frozen |= 1u << l;
+    for (Lanes left = lost; left != 0; left &= left - 1) {
+      const int l = std::countr_zero(left);
+      if (!step_alone(block, l)) frozen |= 1u << l;
     }
     sweeps_.end(block, done);
     if (done != 0) remember_displacement(block, done);

@@ -9,18 +9,19 @@
 //   converged(now), close(now)                  lanes whose residual is below the tolerance; nearly so
 //   at_floor(now, epsilons)                     lanes whose residual is rounding alone
 //   has_states(), revise(revision)              effects that stick, stop or saturate: lanes in which a state changed
-//   first_correction(now, before, floor)        told once, what the first correction left
-//   stale(norm, before)                         whether the factor that was held for it will do
 //   refused(lanes)                              of lanes that are solved those that cannot take the step in one
 //   settle(done, before, active)                these lanes are solved, those were before, others go on with what all share
-//   and alone: cut(share), take_back(share), refactor(now), continuation(now, whole), give_up(seen)
+//   and alone: first_correction(now, before, floor), told once what the first correction left; stale(now, before), whether the factor that
+//   was held for it will not do; cut(share), take_back(share), refactor(now), continuation(now, whole), give_up(seen)
 #pragma once
 
 #include <array>
+#include <bit>
 #include <limits>
 
 #include "engine/solve/decide.hpp"
 #include "engine/solve/judge.hpp"
+#include "engine/solve/lane_counts.hpp"
 #include "kernels/effects/law.hpp"
 
 namespace linden {
@@ -28,8 +29,8 @@ namespace linden {
 template <class S>
 struct Solved {
   Lanes done = 0, lost = 0;
-  S least_w = S(1.0);                                // of those done, see displacement_down
-  std::array<int, LanesOf<S>::count> evaluations{};  // until an instance was done or lost
+  S least_w = S(1.0);      // of those done, see displacement_down
+  LaneCounts evaluations;  // until an instance was done or lost
 };
 
 template <class Sweeps>
@@ -37,7 +38,6 @@ class Solve {
  public:
   using S = typename Sweeps::Number;
   using L = LanesOf<S>;
-  static constexpr int W = L::count;
 
   Solve(Sweeps& sweeps, const Policy& policy) : sweeps_(sweeps), policy_(policy) {}
 
@@ -46,7 +46,7 @@ class Solve {
     now_ = now;
     fresh_ = fresh;
     Solved<S> solved;
-    solved.evaluations.fill(1);
+    solved.evaluations.add(active);
     if (!policy_.judges_guess) correct(active, active, solved);
     for (;;) {
       std::array<Lanes, kNexts> next = decided(active);
@@ -65,7 +65,7 @@ class Solve {
         }
       }
       correct(active, lanes_to(next, Next::correct), solved);
-      for (int l = 0; l < W; ++l) updates_[at(l)] += static_cast<int>(lanes_to(next, Next::update_states) >> l & 1u);
+      updates_.add(lanes_to(next, Next::update_states));
     }
   }
 
@@ -74,28 +74,36 @@ class Solve {
   const Seen& seen() const { return seen_; }
 
  private:
-  static constexpr std::size_t at(int lane) { return static_cast<std::size_t>(lane); }
   static Lanes lanes_to(const std::array<Lanes, kNexts>& next, Next what) { return next[static_cast<std::size_t>(what)]; }
 
-  /// What happens next to each lane.
+  /// What happens next to each lane. Lanes of which the same was seen are decided about once.
   std::array<Lanes, kNexts> decided(Lanes active) {
-    const Lanes usable = L::bits(linden::usable(now_));
-    now_.norm = select(L::mask(usable), now_.norm, as<S>(std::numeric_limits<double>::infinity()));
+    const auto is_usable = usable(now_);
+    now_.norm = select(is_usable, now_.norm, as<S>(std::numeric_limits<double>::infinity()));
+    const Lanes usable = L::bits(is_usable);
     const Lanes fell = L::bits(now_.norm < before_), whole = corrected_ & ~cut_;
     slow_ = (slow_ & ~whole) | (whole & ~L::bits(fell_fast(now_.norm, before_)));
     const Lanes converged = usable & sweeps_.converged(now_);
     const Lanes at_floor = floor(active & usable & ~converged, whole), solved = converged | at_floor;
-    if (whole != 0 && corrections_[0] == 1) sweeps_.first_correction(now_.norm, before_, at_floor != 0);
+    bool stale = false;
+    if constexpr (Sweeps::kAlone) {
+      if (whole != 0 && corrections_.of(0) == 1) sweeps_.first_correction(now_.norm, before_, at_floor != 0);
+    }
     const Lanes changed = revised(active & usable & ~(cut_ & ~fell), solved);
-    const bool stale = corrections_[0] == 1 && corrected_ != 0 && sweeps_.stale(now_, before_);
+    if constexpr (Sweeps::kAlone) stale = corrected_ != 0 && corrections_.of(0) == 1 && sweeps_.stale(now_, before_);
     std::array<Lanes, kNexts> next{};
-    for (int l = 0; l < W; ++l) {
-      if ((active >> l & 1u) == 0) continue;
-      const auto is = [l](Lanes lanes) { return (lanes >> l & 1u) != 0; };
+    for (Lanes left = active; left != 0;) {
+      const int l = std::countr_zero(left);
+      Lanes same = left & corrections_.same_as(l) & updates_.same_as(l);
+      const auto is = [l, &same](Lanes lanes) {
+        same &= LaneCounts::same_lanes(lanes, l);
+        return (lanes >> l & 1u) != 0;
+      };
       seen_ = {is(usable), is(solved), is(at_floor), is(changed), is(corrected_), is(taken_back_), is(fell), is(slow_), stale, is(fresh_),
-               corrections_[at(l)], cuts_, updates_[at(l)]};
+               corrections_.of(l), cuts_, updates_.of(l)};
       const Next what = decide(policy_, seen_);
-      next[static_cast<std::size_t>(what)] |= 1u << l;
+      next[static_cast<std::size_t>(what)] |= same;
+      left &= ~same;
       if constexpr (Sweeps::kAlone) {
         if (what == Next::give_up) sweeps_.give_up(seen_);
       }
@@ -119,12 +127,13 @@ class Solve {
   Lanes revised([[maybe_unused]] Lanes lanes, [[maybe_unused]] Lanes solved) {
     if (!sweeps_.has_states()) return 0;
     Lanes late = 0, last = 0;
-    for (int l = 0; l < W; ++l) {
-      const int updates = updates_[at(l)];
-      const bool is_continued = updates == policy_.first_continuation || updates == policy_.last_continuation;
-      if (is_continued) lanes &= ~(1u << l);
-      if (updates >= policy_.one_state_at_a_time) late |= 1u << l;
-      if (updates >= policy_.one_limit_at_a_time) last |= 1u << l;
+    for (Lanes left = lanes; left != 0;) {
+      const int l = std::countr_zero(left), updates = updates_.of(l);
+      const Lanes same = left & updates_.same_as(l);
+      left &= ~same;
+      if (updates == policy_.first_continuation || updates == policy_.last_continuation) lanes &= ~same;
+      if (updates >= policy_.one_state_at_a_time) late |= same;
+      if (updates >= policy_.one_limit_at_a_time) last |= same;
     }
     if (lanes == 0) return 0;
     const Lanes near = solved | L::bits(within(now_.norm, as<S>(kSettled * kSettled), now_.scale));
@@ -138,10 +147,8 @@ class Solve {
     cut_ = taken_back_ = 0;
     cuts_ = 0;
     share_ = 1;
-    for (int l = 0; l < W; ++l) {
-      corrections_[at(l)] += static_cast<int>(lanes >> l & 1u);
-      solved.evaluations[at(l)] += static_cast<int>(active >> l & 1u);
-    }
+    corrections_.add(lanes);
+    solved.evaluations.add(active);
     rounds_ += 1;
     now_ = sweeps_.evaluate(lanes, rounds_);
   }
@@ -164,9 +171,9 @@ class Solve {
           sweeps_.refactor(now_);
         } else {
           if (lanes_to(next, Next::continuation) != 0) {
-            sweeps_.continuation(now_, updates_[0] == policy_.last_continuation);
+            sweeps_.continuation(now_, updates_.of(0) == policy_.last_continuation);
           }
-          updates_[0] += 1;
+          updates_.add(1);
           now_ = sweeps_.evaluate(0, rounds_);
         }
         fresh_ = 1;
@@ -181,7 +188,7 @@ class Solve {
   Seen seen_;
   Lanes corrected_ = 0, cut_ = 0, taken_back_ = 0, slow_ = 0, fresh_ = 0;
   int rounds_ = 0, cuts_ = 0;
-  std::array<int, W> corrections_{}, updates_{};
+  LaneCounts corrections_, updates_;
   double share_ = 1;  // of the correction that is tried
 };
 

@@ -8,7 +8,7 @@
 // advance_map, placement_map, gravity.hpp and momentum_update_map, fused; E and u for F and r, see innovation_up.
 //
 // reads   screw 2 x n, tree_placement 12 x n, inertia 10 x n, subtree_mass n, motion, displacement, impulse (E), innovation (u), delta,
-//         gravity (nullptr: none), applied nv (forces given from outside; nullptr: none)
+//         applied nv (forces given from outside; nullptr: none)
 // writes  q nq, placement 12 x n, field 3 x n;  first_moment 3 x n, force nv (Q + applied), p nv
 // returns momentum_up: potential energy of gravity [J]
 #pragma once
@@ -20,10 +20,10 @@
 
 namespace linden {
 
-template <class S, class Mask, class Element>
-[[gnu::noinline]] void advance_down(const Tree& tree, const BodyConstants<Element>& constants, const Vec3<S>* gravity, const Mask& moves,
+template <bool kGravity, class S, class Mask, class Element>
+[[gnu::noinline]] void advance_down(const Tree& tree, const BodyConstants<Element>& constants, const Vec3<S>& gravity, const Mask& moves,
                                     Workspace<S>& work, Field<S>& q) {
-  if (gravity != nullptr) store(work.field, 0, *gravity);
+  if constexpr (kGravity) store(work.field, 0, gravity);
   down(tree, [&](auto joint, Index i) {
     const Index row = tree.first_q(i);
     constexpr Index n = position_count(joint);
@@ -33,22 +33,22 @@ template <class S, class Mask, class Element>
     for (Index k = 0; k < n; ++k) q(row + k) = select(moves, q(row + k), before[k]);
     const Placement<S> X = placed(joint, constants, i, row, q);
     store(work.placement, i, X);
-    if (gravity != nullptr) store(work.field, i, transpose_times(X.R, load<Vec3, S>(work.field, tree.parent(i))));
+    if constexpr (kGravity) store(work.field, i, transpose_times(X.R, load<Vec3, S>(work.field, tree.parent(i))));
   });
 }
 
-template <class S, class Mask, class Element>
-[[gnu::noinline]] S momentum_up(const Tree& tree, const BodyConstants<Element>& constants, bool has_gravity, const S& h, const Mask& moves,
+template <bool kGravity, class S, class Mask, class Element>
+[[gnu::noinline]] S momentum_up(const Tree& tree, const BodyConstants<Element>& constants, const S& h, const Mask& moves,
                                 const Field<S>* applied, Workspace<S>& work, Field<S>& p) {
   const S half = S(0.5) * h;
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-  if (has_gravity) {
+  if constexpr (kGravity) {
     for (Index i = 0; i < tree.shape.slots; ++i) store(work.first_moment, i, zero);
   }
   up(tree, [&](auto joint, Index i) {
     const Index row = tree.first_v(i), parent = tree.parent(i);
     Wrench<S> force{zero, zero};
-    if (has_gravity) {
+    if constexpr (kGravity) {
       const auto own = load<Inertia, S>(constants.inertia, i).mc;
       const Vec3<S> c = load<Vec3, S>(work.first_moment, i) + own;
       const auto g = load<Vec3, S>(work.field, i);
@@ -78,7 +78,7 @@ template <class S, class Mask, class Element>
       }
     }
   });
-  if (has_gravity) return -dot(load<Vec3, S>(work.field, 0), load<Vec3, S>(work.first_moment, 0));
+  if constexpr (kGravity) return -dot(load<Vec3, S>(work.field, 0), load<Vec3, S>(work.first_moment, 0));
   return S(0.0);
 }
 

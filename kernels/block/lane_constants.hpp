@@ -1,7 +1,7 @@
 // kernels/block/lane_constants.hpp
 // What never changes about the bodies of a block of instances: one robot for all, but for masses, which may be each instance's own. Which of
 // the two is known when a row is read, not when a sweep is compiled: one branch a body, which a processor foresees, instead of every
-// sweep twice.
+// sweep twice. (The model's masses written out in every lane, so that there is nothing to ask, were measured too: 2 % slower.)
 //
 //   own masses    [slots x kMassRows][lane]: m, m c, xx xy xz yy yz zz, subtree mass
 #pragma once

@@ -27,7 +27,7 @@ const auto down_kernel = make_kernel(
     [](auto& rig) {
       using S = std::decay_t<decltype(rig.h)>;
       const Vec3<S> gravity = field_of_test<S>();
-      advance_down(rig.tree, rig.constants, &gravity, rig.h > S(0.0), rig.work, rig.state.q);
+      advance_down<true>(rig.tree, rig.constants, gravity, rig.h > S(0.0), rig.work, rig.state.q);
     },
     {"placement", "field"}, {"q"});
 
@@ -38,7 +38,7 @@ const auto up_kernel = make_kernel(
     },
     [](auto& rig) {
       rig.result(0) =
-          momentum_up(rig.tree, rig.constants, true, rig.h, rig.h > decltype(rig.h)(0.0), &rig.rate, rig.work, rig.state.p);
+          momentum_up<true>(rig.tree, rig.constants, rig.h, rig.h > decltype(rig.h)(0.0), &rig.rate, rig.work, rig.state.p);
     },
     {"first_moment", "force", "result"}, {"p"});
 
@@ -81,8 +81,8 @@ TEST_CASE("where nothing moves positions and momenta stay, to the bit, and place
     up_kernel.run(rig);
     Rig<double> held = rig;
     const Vec3<double> gravity = field_of_test<double>();
-    advance_down(held.tree, held.constants, &gravity, false, held.work, held.state.q);
-    momentum_up(held.tree, held.constants, true, held.h, false, &held.rate, held.work, held.state.p);
+    advance_down<true>(held.tree, held.constants, gravity, false, held.work, held.state.q);
+    momentum_up<true>(held.tree, held.constants, held.h, false, &held.rate, held.work, held.state.p);
     CHECK(held.state.q == rig.state.q);
     CHECK(held.state.p == rig.state.p);
     CHECK(held.work.force == rig.work.force);
@@ -97,12 +97,11 @@ TEST_CASE("without gravity the forces are those from outside, or none") {
   Rig<double> rig(model);
   rig.set(random_instance(reference::plain_tree(rig.model), 3, 0.1));
   prepare(rig);
-  const Vec3<double>* const none = nullptr;
-  advance_down(rig.tree, rig.constants, none, true, rig.work, rig.state.q);
-  CHECK(momentum_up(rig.tree, rig.constants, false, rig.h, true, &rig.rate, rig.work, rig.state.p) == 0);
+  advance_down<false>(rig.tree, rig.constants, Vec3<double>{0, 0, 0}, true, rig.work, rig.state.q);
+  CHECK(momentum_up<false>(rig.tree, rig.constants, rig.h, true, &rig.rate, rig.work, rig.state.p) == 0);
   CHECK(rig.work.force == rig.rate);
   const Field<double>* const nothing = nullptr;
-  momentum_up(rig.tree, rig.constants, false, rig.h, true, nothing, rig.work, rig.state.p);
+  momentum_up<false>(rig.tree, rig.constants, rig.h, true, nothing, rig.work, rig.state.p);
   CHECK(vector(rig.work.force).isZero(0));
 }
 
