@@ -11,7 +11,11 @@
 
 namespace linden {
 
-/// Every function is inlined where it is called: code for one set of instructions is not shared with that for another.
+/// Lanes in which a bit is what it is in this one.
+LINDEN_INLINE Lanes same_lanes(Lanes bits, int lane) { return (bits >> lane & 1u) != 0 ? bits : ~bits; }
+
+/// Of W lanes. Every function is inlined where it is called: code for one set of instructions is not shared with that for another.
+template <int W>
 class LaneCounts {
  public:
   /// One more in these lanes; from 2^12 on a count begins anew.
@@ -44,12 +48,26 @@ class LaneCounts {
       for (; same != 0; same &= same - 1) visit(std::countr_zero(same), count);
     }
   }
-  /// Lanes in which `digit` is what it is in this one.
-  LINDEN_INLINE static Lanes same_lanes(Lanes digit, int lane) { return (digit >> lane & 1u) != 0 ? digit : ~digit; }
 
  private:
   std::array<Lanes, 12> digits_{};
   std::size_t used_ = 0;  // digits that are not zero in every lane
+};
+
+/// Of one lane a number: a tree of ten bodies is stepped in some thousands of instructions.
+template <>
+class LaneCounts<1> {
+ public:
+  LINDEN_INLINE void add(Lanes lanes) { count_ += static_cast<int>(lanes); }
+  LINDEN_INLINE int of(int) const { return count_; }
+  LINDEN_INLINE Lanes same_as(int) const { return 1; }
+  template <class Visit>
+  LINDEN_INLINE void each(Lanes lanes, const Visit& visit) const {
+    if (lanes != 0) visit(0, count_);
+  }
+
+ private:
+  int count_ = 0;
 };
 
 }  // namespace linden

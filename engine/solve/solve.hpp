@@ -29,8 +29,8 @@ namespace linden {
 template <class S>
 struct Solved {
   Lanes done = 0, lost = 0;
-  S least_w = S(1.0);      // of those done, see displacement_down
-  LaneCounts evaluations;  // until an instance was done or lost
+  S least_w = S(1.0);                         // of those done, see displacement_down
+  LaneCounts<LanesOf<S>::count> evaluations;  // until an instance was done or lost
 };
 
 template <class Sweeps>
@@ -96,7 +96,7 @@ class Solve {
       const int l = std::countr_zero(left);
       Lanes same = left & corrections_.same_as(l) & updates_.same_as(l);
       const auto is = [l, &same](Lanes lanes) {
-        same &= LaneCounts::same_lanes(lanes, l);
+        if constexpr (L::count > 1) same &= same_lanes(lanes, l);
         return (lanes >> l & 1u) != 0;
       };
       seen_ = {is(usable), is(solved), is(at_floor), is(changed), is(corrected_), is(taken_back_), is(fell), is(slow_), stale, is(fresh_),
@@ -188,7 +188,7 @@ class Solve {
   Seen seen_;
   Lanes corrected_ = 0, cut_ = 0, taken_back_ = 0, slow_ = 0, fresh_ = 0;
   int rounds_ = 0, cuts_ = 0;
-  LaneCounts corrections_, updates_;
+  LaneCounts<L::count> corrections_, updates_;
   double share_ = 1;  // of the correction that is tried
 };
 
