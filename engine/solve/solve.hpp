@@ -95,7 +95,7 @@ class Solve {
     for (Lanes left = active; left != 0;) {
       const int l = std::countr_zero(left);
       Lanes same = left & corrections_.same_as(l) & updates_.same_as(l);
-      const auto is = [l, &same](Lanes lanes) {
+      const auto is = [&](Lanes lanes) {
         if constexpr (L::count > 1) same &= same_lanes(lanes, l);
         return (lanes >> l & 1u) != 0;
       };
