@@ -67,8 +67,9 @@ std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockS
 #ifdef LINDEN_WIDE_LANES
       case Instructions::avx512: return make_block_stepper<Instructions::avx512, effects>(setup);
       case Instructions::avx2: return make_block_stepper<Instructions::avx2, effects>(setup);
-#endif
+#else
       case Instructions::baseline: return make_block_stepper<Instructions::baseline, effects>(setup);
+#endif
       default: return make_block_stepper<Instructions::scalar, effects>(setup);
     }
   });

@@ -150,7 +150,7 @@ void check_model(const std::string& file, const Header& header, const Model& mod
   if (header.model_hash == model.hash()) return;
   throw InputError(fmt::format("{}: this checkpoint belongs to another model ({} positions, {} velocities) than {} ({}, {}), "
                                "or to one with other masses or lengths",
-                               file, header.positions, header.velocities, linden::quoted(model.names.model), model.tree.shape.positions,
+                               file, header.positions, header.velocities, quoted(model.names.model), model.tree.shape.positions,
                                model.tree.shape.velocities));
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "engine/mass_distribution.hpp"
+#include "models/build/vectors.hpp"
 
 namespace linden {
 
@@ -16,8 +17,6 @@ bool is_motion(const Model& model, double kinetic) {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 /// Whether no joint ties any body to the world: all roots are carried by free joints.
 bool floats(const Tree& tree) {

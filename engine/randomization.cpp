@@ -62,7 +62,7 @@ void set_range(Randomization& randomization, const std::string& name, std::span<
   const auto found = std::ranges::find(kNames, name);
   if (found == kNames.end()) {
     const std::string guess = nearest(name, kNames);
-    throw InputError(fmt::format("{} is nothing that can be randomised; expected one of {}; {}", linden::quoted(name), fmt::join(kNames, ", "),
+    throw InputError(fmt::format("{} is nothing that can be randomised; expected one of {}; {}", quoted(name), fmt::join(kNames, ", "),
                                  guess.empty() ? "leave it out" : fmt::format("did you mean {}?", guess)));
   }
   const Quantity& quantity = kQuantities[static_cast<std::size_t>(found - kNames.begin())];

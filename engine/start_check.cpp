@@ -21,7 +21,7 @@ namespace linden {
 namespace {
 
 /// What computing a follower's position in another way may round off, of the larger of both and one unit.
-constexpr double kRounding = 1e-9;
+constexpr double kPositionRounding = 1e-9;
 
 std::size_t at(Index row) { return static_cast<std::size_t>(row); }
 
@@ -109,7 +109,7 @@ void StartCheck::look_at_ties(StartFindings& found) const {
   for (const Mimic& mimic : model_.mimics) {
     const double given = found.positions[at(mimic.follower_q)];
     const double tied = mimic.multiplier * found.positions[at(mimic.leader_q)] + mimic.offset;
-    if (std::abs(given - tied) <= kRounding * std::max({1.0, std::abs(given), std::abs(tied)})) continue;
+    if (std::abs(given - tied) <= kPositionRounding * std::max({1.0, std::abs(given), std::abs(tied)})) continue;
     any = true;
     found.faults.push_back(fmt::format("joint {} is at {:.10g} {} and follows {}, which puts it at {:.10g}",
                                        quoted(model_.names.joint[at(mimic.follower_slot)]), given, unit_of(model_, mimic.follower_slot),
@@ -130,7 +130,7 @@ void StartCheck::look_at_limits(StartFindings& found) const {
     if (!(beyond > 0)) continue;
     const std::string name = quoted(model_.names.velocity[at(limit.row)]);
     const std::string_view unit = unit_of(model_, slot);
-    if (beyond <= std::max(kRounding, kWrittenDigits * std::abs(bound))) {
+    if (beyond <= std::max(kPositionRounding, kWrittenDigits * std::abs(bound))) {
       found.moved.push_back(fmt::format("joint {} starts at {:.10g} {}, {:.2g} beyond its limit; moved onto it, {:.10g}", name, q, unit, beyond, bound));
       q = bound;
       continue;
@@ -204,7 +204,7 @@ std::vector<std::string> zeros_outside_limits(const Model& model) {
     for (Index i = run.begin; i < run.end; ++i) {
       const Index v = model.tree.first_v(i);
       const double q = zero[at(model.tree.first_q(i))], lower = model.attributes.lower(v), upper = model.attributes.upper(v);
-      if (std::abs(q - std::clamp(q, lower, upper)) <= kRounding) continue;
+      if (std::abs(q - std::clamp(q, lower, upper)) <= kPositionRounding) continue;
       joints.push_back(fmt::format("{} ({:.6g}, limits {})", quoted(model.names.velocity[at(v)]), q, range_text(lower, upper, unit_of(model, i))));
     }
   }

@@ -16,7 +16,7 @@
 namespace linden {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 std::string advice_for(const std::string& name, const std::vector<std::string>& known, const char* otherwise) {
   const std::string guess = nearest(name, known);
@@ -121,7 +121,7 @@ std::vector<JointLimit> urdf_limits(const Model& model, double restitution, bool
   std::vector<JointLimit> list;
   for (Index row = 0; row < facts.count(); ++row) {
     const double lower = model.attributes.lower(row), upper = model.attributes.upper(row);
-    const double velocity = velocities ? model.attributes.max_velocity(row) : kInfinity;
+    const double velocity = velocities ? model.attributes.max_velocity(row) : kUnlimited;
     const bool any = std::isfinite(lower) || std::isfinite(upper) || std::isfinite(velocity);
     if (any && facts.kind(row) == JointKind::screw) list.push_back({row, lower, upper, restitution, velocity});
   }

@@ -18,9 +18,9 @@ namespace {
 
 std::string csv_cell(const std::string& name) {
   if (name.find_first_of(",\"\r\n") == name.npos) return name;
-  std::string quoted = "\"";
-  for (const char c : name) quoted.append(c == '"' ? 2 : 1, c);
-  return quoted + '"';
+  std::string cell = "\"";
+  for (const char c : name) cell.append(c == '"' ? 2 : 1, c);
+  return cell + '"';
 }
 
 /// No two are alike: a name that another column had before, such as that of a joint "time", is followed by _2, or by _3 and so on where

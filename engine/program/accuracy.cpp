@@ -61,9 +61,9 @@ struct Motion {
   bool stopped = false;
 };
 
-class Measurement {
+class AccuracyMeasurement {
  public:
-  Measurement(const AccuracySetup& setup, const std::function<bool(double)>& go_on)
+  AccuracyMeasurement(const AccuracySetup& setup, const std::function<bool(double)>& go_on)
       : setup_(setup), go_on_(go_on), begin_(Clock::now()), methods_(methods_for(setup.effects)),
         reversible_(irreversible(setup.effects).empty()), smooth_(sudden(setup.effects).empty()) {
     figures_.asked = setup.duration;
@@ -429,12 +429,12 @@ std::string name(const AccuracyMethod& method) {
 
 AccuracyFigures measure_accuracy(const AccuracySetup& setup, const std::function<bool(double)>& go_on) {
   check(setup.options);
-  return Measurement(setup, go_on).figures();
+  return AccuracyMeasurement(setup, go_on).figures();
 }
 
 AccuracyRow measure_energy(const AccuracySetup& setup, const AccuracyMethod& method, double step, double tolerance,
                            double kinetic) {
-  return Measurement(setup, [](double) { return true; }).energy(method, step, tolerance, kinetic);
+  return AccuracyMeasurement(setup, [](double) { return true; }).energy(method, step, tolerance, kinetic);
 }
 
 }  // namespace linden

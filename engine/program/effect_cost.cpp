@@ -14,7 +14,7 @@ namespace linden {
 namespace {
 
 constexpr int kRounds = 5;
-constexpr double kSeconds = 0.15;  // of steps of each, over all rounds
+constexpr double kSecondsOfEach = 0.15;  // of steps of each, over all rounds
 
 using Clock = std::chrono::steady_clock;
 
@@ -77,7 +77,7 @@ std::vector<EffectCost> effect_costs(const Scene& scene) {
   }
   contend("all", scene.effects);
   for (int round = 0; round < kRounds; ++round) {
-    for (const auto& contender : contenders) contender->take(kSeconds / kRounds);
+    for (const auto& contender : contenders) contender->take(kSecondsOfEach / kRounds);
   }
   std::vector<EffectCost> costs;
   const double none = contenders.front()->seconds_per_step();

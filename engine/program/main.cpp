@@ -131,7 +131,8 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
   add("Method", "--order", texts.order, "N", "of the integrator: 2 alone; run has 4, 6 and 8 too");
   command->add_flag("--float", rollout.single, "single precision: twice as fast, half the memory")->group("Method");
   add("Processor", "--threads", texts.threads, "T", "default: all there are; results do not depend on it");
-  add("Processor", "--instructions", texts.instructions, "NAME", "scalar, baseline, avx2 or avx512; default: the best there is");
+  add("Processor", "--instructions", texts.instructions, "NAME",
+      "scalar, avx2, avx512 or baseline (SSE2, NEON), if built with it; default: the best there is");
   add("Output", "--record", rollout.record, "FILE.npz|h5", "time, energy, status and what --what says, of all instances");
   add("Output", "--what", texts.what, "LIST", "of positions, velocities (default: both) and energies");
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");

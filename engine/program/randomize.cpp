@@ -36,18 +36,18 @@ void randomize_from(const std::string& text, const Effects& effects, Randomizati
       if (!number) {
         throw InputError(fmt::format("--randomize {}: {} is no range; expected name=p or name=low:high, with commas; write for example "
                                      "masses=0.2,friction=0.4:1.0",
-                                     linden::quoted(text), linden::quoted(part)));
+                                     quoted(text), quoted(part)));
       }
       numbers.push_back(*number);
     }
     if (std::ranges::find(named, name) != named.end()) {
-      throw InputError(fmt::format("--randomize {} names {} twice; expected it once; leave one out", linden::quoted(text), name));
+      throw InputError(fmt::format("--randomize {} names {} twice; expected it once; leave one out", quoted(text), name));
     }
     named.push_back(name);
     try {
       set_range(randomization, name, numbers, effects);
     } catch (const InputError& error) {
-      throw InputError(fmt::format("--randomize {}: {}", linden::quoted(text), error.what()));
+      throw InputError(fmt::format("--randomize {}: {}", quoted(text), error.what()));
     }
   }
 }

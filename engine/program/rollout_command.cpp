@@ -55,9 +55,9 @@ void check_instances(const RolloutArguments& arguments, const Shape& shape) {
 
 /// One rollout from its start to its files.
 template <class Real>
-class Execution {
+class RolloutExecution {
  public:
-  Execution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
+  RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
       : arguments_(arguments),
         model_(std::move(model)),
         effects_(arguments.effects()),
@@ -265,7 +265,7 @@ template <class Real>
 int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
   check_instances<Real>(arguments, model->tree.shape);
   const Interrupt interrupt;
-  Execution<Real> rollout(arguments, model, steps);
+  RolloutExecution<Real> rollout(arguments, model, steps);
   rollout.steps(interrupt);
   RolloutFigures& figures = rollout.figures();
   figures.total_seconds = seconds(Clock::now() - begin);

@@ -90,9 +90,9 @@ void begin_run(const RunArguments& arguments, Simulation& simulation) {
 }
 
 /// One run from its first sample to its files.
-class Execution {
+class RunExecution {
  public:
-  Execution(const RunArguments& arguments, Simulation& simulation, std::int64_t steps, const DrawnNumbers& drawn)
+  RunExecution(const RunArguments& arguments, Simulation& simulation, std::int64_t steps, const DrawnNumbers& drawn)
       : arguments_(arguments), simulation_(simulation) {
     figures_.drawn = drawn;
     figures_.steps_planned = steps;
@@ -232,7 +232,7 @@ class Execution {
 };
 
 /// What to say of a run that did not reach its end.
-std::string ending(const Execution& run, const RunFigures& figures, const Options& options) {
+std::string ending(const RunExecution& run, const RunFigures& figures, const Options& options) {
   const std::int64_t done = figures.run.steps;
   const double time = figures.begin + figures.simulated(options.step);
   const std::string files = run.written().empty() ? "" : fmt::format("; {} {} valid up to there", fmt::join(run.written(), ", "),
@@ -267,7 +267,7 @@ int run_command(const RunArguments& given) {
   begin_run(arguments, simulation);
 
   const Interrupt interrupt;
-  Execution run(arguments, simulation, steps, drawn);
+  RunExecution run(arguments, simulation, steps, drawn);
   run.steps(interrupt);
   RunFigures& figures = run.figures();
   figures.total_seconds = seconds(Clock::now() - begin);

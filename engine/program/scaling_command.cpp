@@ -72,9 +72,9 @@ void check_arguments(const ScalingArguments& arguments) {
 }
 
 /// The steps of one row.
-class Measurement {
+class ScalingMeasurement {
  public:
-  Measurement(const ScalingArguments& arguments, std::shared_ptr<const Model> model, Solver solver, std::function<bool()> go_on)
+  ScalingMeasurement(const ScalingArguments& arguments, std::shared_ptr<const Model> model, Solver solver, std::function<bool()> go_on)
       : simulation_(model, with_solver(arguments.options, solver)), go_on_(std::move(go_on)) {
     const Tree& tree = model->tree;
     row_.solver = solver;
@@ -159,7 +159,7 @@ ScalingFigures measure(const ScalingArguments& arguments, const std::vector<std:
     const auto model = std::make_shared<const Model>(generate(name));
     for (const Solver solver : arguments.solvers) {
       if (!go_on()) break;
-      std::optional<ScalingRow> row = Measurement(arguments, model, solver, go_on).row(arguments.steps);
+      std::optional<ScalingRow> row = ScalingMeasurement(arguments, model, solver, go_on).row(arguments.steps);
       if (!row) break;
       row->model = name;
       figures.rows.push_back(std::move(*row));

@@ -18,6 +18,7 @@
 #include "layout/smooth_curve.hpp"
 #include "layout/support/words.hpp"
 #include "models/build/isometry.hpp"
+#include "models/build/vectors.hpp"
 #include "models/shapes/contacts_of.hpp"
 
 namespace linden {
@@ -36,7 +37,7 @@ const std::vector<std::string> kEffects = [] {
   return names;
 }();
 
-/// Says which effect a reader is for: Reader has one for each that is not read by its table of numbers.
+/// Says which effect a reader is for: EffectsReader has one for each that is not read by its table of numbers.
 template <class Entry>
 struct Of {};
 
@@ -49,16 +50,13 @@ const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
 /// By which a curve may round beyond a limit that one of its points lies on [rad, m].
-constexpr double kRounding = 1e-9;
+constexpr double kCurveRounding = 1e-9;
 
 constexpr std::string_view kVelocityLimit = "urdf or a number";
 
-std::array<double, 3> array_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
-class Reader {
+class EffectsReader {
  public:
-  Reader(const Model& model, const std::vector<double>& start, std::string folder)
+  EffectsReader(const Model& model, const std::vector<double>& start, std::string folder)
       : model_(model), start_(start), folder_(std::move(folder)), joints_(model) {}
 
   std::vector<JointLimit> read_limits(const SceneValue& at) {
@@ -150,7 +148,7 @@ class Reader {
     const auto locked = std::ranges::find(list, 0.0, &JointLimit::velocity);
     if (locked == list.end()) return;
     warn(fmt::format("{} of {} joints cannot move ({}): their limit of velocity is 0", std::ranges::count(list, 0.0, &JointLimit::velocity),
-                     list.size(), linden::quoted(model_.names.velocity[static_cast<std::size_t>(locked->row)])));
+                     list.size(), quoted(model_.names.velocity[static_cast<std::size_t>(locked->row)])));
   }
 
   /// What stands beside the joints, for those that have no values of their own.
@@ -184,7 +182,7 @@ class Reader {
       if (const auto value = at.find("velocity")) {
         result.velocity = value->says("urdf") ? model_.attributes.max_velocity(row) : value->not_negative(kVelocityLimit);
         if (!std::isfinite(result.velocity))
-          value->fail(fmt::format("the model's file limits no velocity of {}", linden::quoted(entry.key)), "a number", "write one");
+          value->fail(fmt::format("the model's file limits no velocity of {}", quoted(entry.key)), "a number", "write one");
       }
     }
     if (!std::isfinite(result.lower) && !std::isfinite(result.upper) && !std::isfinite(result.velocity)) {
@@ -225,9 +223,9 @@ class Reader {
       const auto found = std::ranges::find(result_.effects.motions, limit.row, &JointMotion::row);
       if (found == result_.effects.motions.end()) continue;
       for (const auto& [time, value] : SmoothCurve(found->position, found->velocities).extremes()) {
-        if (value >= limit.lower - kRounding && value <= limit.upper + kRounding) continue;
+        if (value >= limit.lower - kCurveRounding && value <= limit.upper + kCurveRounding) continue;
         at.find("motion")->fail(fmt::format("effects.motion leads {} to {:.6g} at {:.6g} s, beyond its limits of {} to {}",
-                                            linden::quoted(model_.names.velocity[static_cast<std::size_t>(limit.row)]), value, time, limit.lower,
+                                            quoted(model_.names.velocity[static_cast<std::size_t>(limit.row)]), value, time, limit.lower,
                                             limit.upper),
                                 "positions within them", "change the table, or leave the joint out of limits");
       }
@@ -295,11 +293,11 @@ class Reader {
         const Index slot = joints_.body(entry.value, entry.key).slot;
         entry.value.entries_of(kBodyDrag);
         if (!has_mass(slot))
-          entry.value.fail(fmt::format("the body of link {} has no mass", linden::quoted(entry.key)), "one that drag can act on",
+          entry.value.fail(fmt::format("the body of link {} has no mass", quoted(entry.key)), "one that drag can act on",
                            "leave it out");
         const auto [before, fresh] = named.emplace(slot, entry.key);
         if (!fresh) {
-          entry.value.fail(fmt::format("links {} and {} are one body", linden::quoted(before->second), linden::quoted(entry.key)),
+          entry.value.fail(fmt::format("links {} and {} are one body", quoted(before->second), quoted(entry.key)),
                            "every body once", "leave one out");
         }
         drags[slot] = coefficients(entry.value, Drag{slot});
@@ -371,10 +369,10 @@ class Reader {
 
 const std::vector<std::string>& effect_keys() { return kEffects; }
 
-std::vector<JointLimit> read_limits(const SceneValue& at, const Model& model) { return Reader(model, {}, "").read_limits(at); }
+std::vector<JointLimit> read_limits(const SceneValue& at, const Model& model) { return EffectsReader(model, {}, "").read_limits(at); }
 
 SceneEffects read_effects(const SceneValue& at, const Model& model, const std::vector<double>& start, const std::string& folder) {
-  return Reader(model, start, folder).read(at);
+  return EffectsReader(model, start, folder).read(at);
 }
 
 }  // namespace linden

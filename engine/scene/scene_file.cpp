@@ -96,7 +96,7 @@ class SceneReader {
       for (const SceneValue::Entry& entry : values->entries("a map of joints")) {
         const Index row = row_of(scene_.model, entry.key);
         if (std::ranges::find(scene_.effects.motions, row, &JointMotion::row) == scene_.effects.motions.end()) continue;
-        entry.value.fail(fmt::format("the motion of joint {} is given", linden::quoted(entry.key)), "a joint that moves by itself",
+        entry.value.fail(fmt::format("the motion of joint {} is given", quoted(entry.key)), "a joint that moves by itself",
                          "leave it out: it starts where effects.motion does");
       }
     }
@@ -125,7 +125,7 @@ class SceneReader {
     scene_.model.warnings.push_back(fmt::format(
         "{}: a step of {:g} s does not resolve a stiffness of {:.3g} N/m under the {:.3g} kg of link {}: what bounces there loses energy; elastic "
         "bounces need a step below {:.3g} s or a stiffness below {:.3g} N/m",
-        at.place(), h, stiffness, stiff->mass, linden::quoted(stiff->link), std::sqrt(stiff->mass / stiffness), stiff->mass / (h * h)));
+        at.place(), h, stiffness, stiff->mass, quoted(stiff->link), std::sqrt(stiff->mass / stiffness), stiff->mass / (h * h)));
   }
 
   void read_model() {
@@ -147,7 +147,7 @@ class SceneReader {
                              const std::vector<std::string>& names) {
     for (std::size_t row = 0; row < values.size(); ++row) {
       if (std::isfinite(values[row])) continue;
-      at.fail(fmt::format("the {} {} is {} at the start", what, linden::quoted(names[row]), values[row]), "finite numbers",
+      at.fail(fmt::format("the {} {} is {} at the start", what, quoted(names[row]), values[row]), "finite numbers",
               "choose smaller ones, or a smaller spread");
     }
   }
@@ -180,7 +180,7 @@ class SceneReader {
     const std::string file = (std::filesystem::path(folder_) / name).string();
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored)) {
-      at.fail(fmt::format("{}: there is no file {}", at.path(), linden::quoted(file)), "a URDF file, found relative to the scene",
+      at.fail(fmt::format("{}: there is no file {}", at.path(), quoted(file)), "a URDF file, found relative to the scene",
               "check the path; a generated model is written chain:3");
     }
     return load_urdf(file, root.value_or(Base::fixed), Reading::lenient, density_of(inertia));
@@ -233,7 +233,7 @@ class SceneReader {
       std::string& name = entrant.placed.name;
       if (name.empty()) name = entrant.placed.model.names.model;
       if (!seen.insert(name).second) {
-        entrant.at.fail(fmt::format("two models are called {}", linden::quoted(name)), "a name of its own for each",
+        entrant.at.fail(fmt::format("two models are called {}", quoted(name)), "a name of its own for each",
                         "write name: beside them");
       }
     }

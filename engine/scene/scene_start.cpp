@@ -9,6 +9,7 @@
 #include "layout/effects.hpp"
 #include "layout/support/words.hpp"
 #include "models/build/isometry.hpp"
+#include "models/build/vectors.hpp"
 
 namespace linden {
 namespace {
@@ -18,7 +19,6 @@ using Eigen::Vector3d;
 const std::vector<std::string> kKeys{"base", "positions", "velocities", "seed", "spread"};
 const std::vector<std::string> kBaseKeys{"position", "rotation", "quaternion", "velocity", "angular_velocity"};
 
-Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 Eigen::Matrix3d matrix_of(const std::array<double, 4>& q) { return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix(); }
 
 /// Body frame at q = 0 in the world, of a root.

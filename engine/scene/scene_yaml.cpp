@@ -168,7 +168,7 @@ void refuse_control_characters(const std::string& text, const std::string& file)
   }
 }
 
-int lines_of(const std::string& text) {
+int line_count(const std::string& text) {
   return std::max(1, static_cast<int>(std::ranges::count(text, '\n')) + (text.ends_with('\n') ? 0 : 1));
 }
 
@@ -218,7 +218,7 @@ SceneYaml::SceneYaml(const std::string& text, std::string file) : file_(std::mov
     if (const int tab = line_with_tab(text, line); tab > 0) {
       fail_at(file_, tab, "this is no YAML: a tab begins the line", "spaces before a key", "replace the tab by spaces");
     }
-    fail_at(file_, std::min(line, lines_of(text)), "this is no YAML: " + one_line(error.msg), "key: value",
+    fail_at(file_, std::min(line, line_count(text)), "this is no YAML: " + one_line(error.msg), "key: value",
             "check indentation, colons, quotes and brackets here and above");
   }
   root_ = builder.root();

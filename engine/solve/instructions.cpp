@@ -8,23 +8,24 @@ namespace linden {
 
 bool available(Instructions instructions) {
   switch (instructions) {
-    case Instructions::scalar:
-    case Instructions::baseline: return true;
+    case Instructions::scalar: return true;
 #ifdef LINDEN_WIDE_LANES
     case Instructions::avx2: return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     case Instructions::avx512:
       return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
              __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512cd");
+#else
+    case Instructions::baseline: return true;
 #endif
     default: return false;
   }
 }
 
 Instructions best_instructions() {
-  for (const Instructions candidate : {Instructions::avx512, Instructions::avx2}) {
+  for (const Instructions candidate : {Instructions::avx512, Instructions::avx2, Instructions::baseline}) {
     if (available(candidate)) return candidate;
   }
-  return Instructions::baseline;
+  return Instructions::scalar;
 }
 
 std::string_view name(Instructions instructions) {

@@ -1,5 +1,6 @@
 // engine/solve/instructions.hpp
-// Sets of vector instructions that blocks of instances are compiled for; which of them there are is known when the program starts.
+// Sets of vector instructions that blocks of instances are compiled for; which of them this processor has is known when the program starts.
+// On x86-64 a build has AVX2 and AVX-512, or SSE2 in their place (LINDEN_WIDE_LANES in CMakeLists.txt).
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@
 
 namespace linden {
 
-std::string quoted(std::string_view text) {
+std::string Quoted::operator()(std::string_view text) const {
   constexpr std::size_t kShown = 60;
   std::size_t end = std::min(kShown, text.size());
   // whole characters of UTF-8

@@ -13,8 +13,12 @@
 
 namespace linden {
 
-/// Text of a file inside a message: on one line, cut where it is long.
-std::string quoted(std::string_view text);
+/// Text of a file inside a message: on one line, cut where it is long. An object, because a function would give way to std::quoted in files
+/// that include <iomanip>.
+struct Quoted {
+  std::string operator()(std::string_view text) const;
+};
+inline constexpr Quoted quoted{};
 
 /// Cuts the next word between spaces, tabs and line ends off `rest`; empty when there is none.
 std::string_view next_word(std::string_view& rest);

@@ -9,6 +9,7 @@
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
 #include "models/build/isometry.hpp"
+#include "models/build/vectors.hpp"
 #include "models/shapes/mesh_box.hpp"
 #include "models/shapes/mesh_path.hpp"
 
@@ -16,8 +17,6 @@ namespace linden {
 namespace {
 
 using Eigen::Vector3d;
-
-std::array<double, 3> array_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 /// Both ends of a length about its middle; one, where it has none.
 std::vector<double> ends_of(double length) {

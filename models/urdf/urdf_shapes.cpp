@@ -15,9 +15,9 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-class Reader {
+class ShapesReader {
  public:
-  Reader(const UrdfLink& link, UrdfReport& report) : owner_("link " + quoted(link.name)), report_(report), numbers_(report) {}
+  ShapesReader(const UrdfLink& link, UrdfReport& report) : owner_("link " + quoted(link.name)), report_(report), numbers_(report) {}
 
   std::optional<LinkShape> read(const XMLElement& holder) {
     const XMLElement* geometry = holder.FirstChildElement("geometry");
@@ -101,7 +101,7 @@ std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report, const
   std::vector<LinkShape> shapes;
   const XMLElement* holder = link.element->FirstChildElement(tag);
   if (!holder) return shapes;
-  Reader reader(link, report);
+  ShapesReader reader(link, report);
   for (; holder; holder = holder->NextSiblingElement(tag)) {
     if (std::optional<LinkShape> shape = reader.read(*holder)) shapes.push_back(std::move(*shape));
   }

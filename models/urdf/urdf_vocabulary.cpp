@@ -25,8 +25,8 @@ using enum UrdfCount;
 constexpr auto kVocabulary = std::to_array<UrdfElement>({
     // name               parents                            use        count       attributes                     attributes that are lost
     {"robot",             "",                                moves,     one,        "name version xmlns xmlns:* xsi:*", ""},
-    {"link",              "robot",                           moves,     any,        "name type",                   ""},
-    {"joint",             "robot",                           moves,     any,        "name type dont_collapse",     ""},
+    {"link",              "robot",                           moves,     many,       "name type",                   ""},
+    {"joint",             "robot",                           moves,     many,       "name type dont_collapse",     ""},
     {"inertial",          "link",                            moves,     one,        "",                            ""},
     {"origin",            "joint inertial collision visual", moves,     one,        "xyz rpy",                     ""},
     {"mass",              "inertial",                        moves,     one,        "value",                       ""},
@@ -39,7 +39,7 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"dynamics",          "joint",                           moves,     one,        "damping friction",
      "armature rotor_inertia gear_ratio stiffness spring_stiffness spring_reference K D mu_coulomb mu_viscous drake:*"},
     {"mimic",             "joint",                           moves,     one,        "joint multiplier offset",     ""},
-    {"collision",         "link",                            moves,     any,        "name group",                  ""},
+    {"collision",         "link",                            moves,     many,       "name group",                  ""},
     {"geometry",          "collision visual",                moves,     one,        "name",                        ""},
     {"sphere",            "geometry",                        moves,     one_of_all, "radius",                      ""},
     {"box",               "geometry",                        moves,     one_of_all, "size",                        ""},
@@ -47,8 +47,8 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"capsule",           "geometry",                        moves,     one_of_all, "radius length",               ""},
     {"mesh",              "geometry",                        moves,     one_of_all, "filename scale",              ""},
 
-    {"visual",            "link",                            no_motion, any,        "name group",                  ""},
-    {"material",          "robot visual collision",          no_motion, any,        "name",                        ""},
+    {"visual",            "link",                            no_motion, many,       "name group",                  ""},
+    {"material",          "robot visual collision",          no_motion, many,       "name",                        ""},
     {"color",             "material",                        no_motion, one,        "rgba",                        ""},
     {"texture",           "material",                        no_motion, one,        "filename",                    ""},
     {"verbose",           "collision",                       no_motion, one,        "value",                       ""},
@@ -56,39 +56,39 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"safety_controller", "joint",                           no_motion, one,
      "soft_lower_limit soft_upper_limit k_position k_velocity", ""},
 
-    {"loop_joint",        "robot",                           lost,      any,        "",                            ""},
-    {"cable",             "robot",                           lost,      any,        "",                            ""},
-    {"force_element",     "robot",                           lost,      any,        "",                            ""},
-    {"spring",            "robot joint",                     lost,      any,        "",                            ""},
-    {"traits",            "joint",                           lost,      any,        "",                            ""},
-    {"joint_properties",  "joint",                           lost,      any,        "",                            ""},
-    {"drake:linear_bushing_rpy", "robot",                    lost,      any,        "",                            ""},
-    {"drake:ball_constraint",    "robot",                    lost,      any,        "",                            ""},
-    {"drake:mimic",       "joint",                           lost,      any,        "",                            ""},
-    {"contact",           "link",                            lost,      any,        "",                            ""},
-    {"gravity",           "link",                            lost,      any,        "",                            ""},
-    {"ellipsoid",         "geometry",                        lost,      any,        "",                            ""},
-    {"plane",             "geometry",                        lost,      any,        "",                            ""},
+    {"loop_joint",        "robot",                           lost,      many,       "",                            ""},
+    {"cable",             "robot",                           lost,      many,       "",                            ""},
+    {"force_element",     "robot",                           lost,      many,       "",                            ""},
+    {"spring",            "robot joint",                     lost,      many,       "",                            ""},
+    {"traits",            "joint",                           lost,      many,       "",                            ""},
+    {"joint_properties",  "joint",                           lost,      many,       "",                            ""},
+    {"drake:linear_bushing_rpy", "robot",                    lost,      many,       "",                            ""},
+    {"drake:ball_constraint",    "robot",                    lost,      many,       "",                            ""},
+    {"drake:mimic",       "joint",                           lost,      many,       "",                            ""},
+    {"contact",           "link",                            lost,      many,       "",                            ""},
+    {"gravity",           "link",                            lost,      many,       "",                            ""},
+    {"ellipsoid",         "geometry",                        lost,      many,       "",                            ""},
+    {"plane",             "geometry",                        lost,      many,       "",                            ""},
 
-    {"gazebo",            "robot link joint",                others,    any,        "",                            ""},
-    {"transmission",      "robot",                           others,    any,        "",                            ""},
-    {"actuator",          "robot joint",                     others,    any,        "",                            ""},
-    {"hardwareInterface", "joint",                           others,    any,        "",                            ""},
-    {"ros2_control",      "robot",                           others,    any,        "",                            ""},
-    {"sensor",            "robot link joint",                others,    any,        "",                            ""},
-    {"sensor:*",          "robot link joint",                others,    any,        "",                            ""},
-    {"controller:*",      "robot link joint",                others,    any,        "",                            ""},
-    {"controller_gains",  "joint",                           others,    any,        "",                            ""},
-    {"drake:*",           "*",                               others,    any,        "",                            ""},
-    {"mujoco",            "robot",                           others,    any,        "",                            ""},
-    {"frame",             "robot",                           others,    any,        "",                            ""},
-    {"collision_filter_group", "robot",                      others,    any,        "",                            ""},
-    {"disable_collisions", "robot",                          others,    any,        "",                            ""},
-    {"self_collision_checking", "link",                      others,    any,        "",                            ""},
-    {"collision_checking", "link",                           others,    any,        "",                            ""},
-    {"self_filter",       "link",                            others,    any,        "",                            ""},
+    {"gazebo",            "robot link joint",                others,    many,       "",                            ""},
+    {"transmission",      "robot",                           others,    many,       "",                            ""},
+    {"actuator",          "robot joint",                     others,    many,       "",                            ""},
+    {"hardwareInterface", "joint",                           others,    many,       "",                            ""},
+    {"ros2_control",      "robot",                           others,    many,       "",                            ""},
+    {"sensor",            "robot link joint",                others,    many,       "",                            ""},
+    {"sensor:*",          "robot link joint",                others,    many,       "",                            ""},
+    {"controller:*",      "robot link joint",                others,    many,       "",                            ""},
+    {"controller_gains",  "joint",                           others,    many,       "",                            ""},
+    {"drake:*",           "*",                               others,    many,       "",                            ""},
+    {"mujoco",            "robot",                           others,    many,       "",                            ""},
+    {"frame",             "robot",                           others,    many,       "",                            ""},
+    {"collision_filter_group", "robot",                      others,    many,       "",                            ""},
+    {"disable_collisions", "robot",                          others,    many,       "",                            ""},
+    {"self_collision_checking", "link",                      others,    many,       "",                            ""},
+    {"collision_checking", "link",                           others,    many,       "",                            ""},
+    {"self_filter",       "link",                            others,    many,       "",                            ""},
 
-    {"xacro:*",           "*",                               macro,     any,        "",                            ""},
+    {"xacro:*",           "*",                               macro,     many,       "",                            ""},
 });
 
 /// What other formats call the same: theirs, ours.
@@ -233,7 +233,7 @@ class Walk {
       } else {
         const bool alternative = child_row->element->count == one_of_all;
         const XMLElement*& before = alternative ? first_of_all : first[vocabulary_.index(*child_row)];
-        if (before && child_row->element->count != any) tell_repeated(*child, *before, element, row, owner);
+        if (before && child_row->element->count != many) tell_repeated(*child, *before, element, row, owner);
         if (!before) before = child;
         look_at(*child, *child_row, owner);
       }

@@ -39,7 +39,7 @@ enum class UrdfUse : std::uint8_t {
 /// How many elements of one name, or of one kind, their parent may hold.
 enum class UrdfCount : std::uint8_t {
   one,
-  any,
+  many,
   one_of_all  // one of all elements that are counted so: the shapes of a geometry
 };
 

@@ -1,6 +1,8 @@
 // A batch is many simulations: the same motion as one by one, the same bits in any company, and no instance pays for another's failure.
 #include "engine/batch.hpp"
 
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
@@ -415,6 +417,21 @@ TEST_CASE("what makes no sense for a batch is refused with what was found and ex
   CHECK_THROWS_WITH(batch.set_inertia(0, 9, {}), Catch::Contains("no body 9"));
   CHECK_THROWS_WITH(batch.set_inertia(0, 1, {-1, 0, 0, 0, 1, 0, 0, 1, 0, 1}), Catch::Contains("no body's"));
   CHECK_THROWS_WITH(batch.set_inertia(0, 1, {1, 1, 0, 0, 1, 0, 0, 0.5, 0, 1}), Catch::Contains("no body's"));
+}
+
+TEST_CASE("instructions that this processor or this build has not are refused, and the best there is is named") {
+  const Instructions best = best_instructions();
+  REQUIRE(available(best));
+  REQUIRE(available(Instructions::scalar));
+  int refused = 0;
+  for (const Instructions one : {Instructions::baseline, Instructions::avx2, Instructions::avx512}) {
+    if (available(one)) continue;
+    INFO(name(one));
+    CHECK_THROWS_WITH(Batch(chain(3), 4, {}, {}, {.instructions = one}),
+                      Catch::Contains(fmt::format("no {} instructions", name(one))) && Catch::Contains(std::string(name(best))));
+    refused += 1;
+  }
+  CHECK(refused > 0);  // no build has all sets
 }
 
 TEST_CASE("an instance, a body or a row that there is not is refused wherever it is asked for") {

@@ -51,7 +51,7 @@ Asked asked(int argc, char** argv, bool& help) {
     const auto found = std::ranges::find(kChecks, only, [](Check check) { return name(check); });
     if (found == kChecks.end()) {
       throw InputError(
-          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity or bits", linden::quoted(only)));
+          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity or bits", quoted(only)));
     }
     result.only = *found;
   }
