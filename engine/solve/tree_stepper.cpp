@@ -8,8 +8,7 @@
 
 #include "engine/guess/first_guess.hpp"
 #include "engine/solve/diagnosis.hpp"
-#include "kernels/tree/momentum_update_map.hpp"
-#include "kernels/tree/motion_map.hpp"
+#include "engine/sweeps/tree_kernels.hpp"
 
 namespace linden {
 

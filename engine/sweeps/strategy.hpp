@@ -18,6 +18,9 @@ enum class Order : std::uint8_t {
   long_chain,  // as a whole, with momenta formed on the way up, where a factor reads inertias and displacements too
 };
 
+/// With which factor an evaluation's residual is to be solved.
+enum class Factor : std::uint8_t { fresh, kept };
+
 struct Strategy {
   bool gravity = false;        // else nothing is computed for it
   bool one_pass = false;       // one upward sweep finds residual, norm and first half of a solve; else one after the other

@@ -41,9 +41,6 @@ struct EnergyStep {
   double before = 0, now = 0, work = 0;
 };
 
-/// With which factor an evaluation's residual is to be solved.
-enum class Factor : std::uint8_t { fresh, kept };
-
 /// kEffects: with those of the plan, beside gravity.
 template <bool kEffects>
 class TreeSweeps {
@@ -166,7 +163,7 @@ class TreeSweeps {
   template <class Down>
   void tie(const Gains<double>& gains, const Down& down);
   double pass_residual();
-  void pass_down();
+  void pass_down(Field<double>& correction);
   double momenta_of_delta(Field<double>& momenta);
   double slope_along(const Field<double>& innovation_before) const;
   double along(const Field<double>& correction) const;
