@@ -1,6 +1,6 @@
 // engine/sweeps/strategy.hpp
 // How the sweeps of one tree are run: what follows from model, options and effects once and for all. The sweeps go by it, and so does whoever
-// lists them (sweeps.hpp).
+// lists them (schedule.hpp).
 #pragma once
 
 #include <cstdint>

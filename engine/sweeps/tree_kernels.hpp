@@ -1,6 +1,6 @@
 // engine/sweeps/tree_kernels.hpp
 // The sweeps over one tree of doubles, compiled once, in tree_kernels.cpp and tree_factor_kernels.cpp: whoever steps a tree calls the very
-// same instructions as whoever measures them. Not so those that steps of lanes call for doubles too, compiled for any processor: of
+// same instructions as whoever goes by the schedule. Not so those that steps of lanes call for doubles too, compiled for any processor: of
 // equal functions the linker takes either.
 #pragma once
 
