@@ -1,5 +1,7 @@
 // Of tree_sweeps.hpp: where the bodies are, what potentials do to them there, and the end of a step.
 #include <algorithm>
+#include <iterator>
+#include <string_view>
 
 #include "engine/sweeps/tree_kernels.hpp"
 #include "engine/sweeps/tree_sweeps.hpp"
@@ -101,6 +103,19 @@ void TreeSweeps<kEffects>::arrive(double h, State<double>& state) {
   valid_.placements = true;
   find_potentials(state.q);
 }
+
+#ifdef LINDEN_POISON
+/// What stays between steps follows from the positions; so may the factor.
+template <bool kEffects>
+void TreeSweeps<kEffects>::poison_scratch() {
+  constexpr std::string_view standing[] = {"placement", "force", "field", "first_moment"}, factor[] = {"gain_up", "gain_down", "joint_inverse"};
+  Workspace<double>::each(work_, [&](std::string_view name, auto& field, Rows, const char*) {
+    const bool stays = std::ranges::find(standing, name) != std::end(standing) ||
+                       (strategy_.reuses_factor && std::ranges::find(factor, name) != std::end(factor));
+    if (!stays) poison(field);
+  });
+}
+#endif
 
 template class TreeSweeps<LINDEN_ACTING>;
 

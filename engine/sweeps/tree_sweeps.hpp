@@ -123,6 +123,9 @@ class TreeSweeps {
   void momentum_of(const Field<double>& v, Field<double>& p);
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
+  /// Fills with NaN what no sweep may read before it is written again, once a step is over and the next has not begun. Only where compiled
+  /// with LINDEN_POISON.
+  void poison_scratch();
   /// At the end of a step with effects: what velocities are read from beside p.
   void end_reading(const Field<double>& before, bool known) {
     if constexpr (kEffects) {
