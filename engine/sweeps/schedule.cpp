@@ -68,6 +68,7 @@ void factor_ties(Memory m, const Gains<double>& gains, bool newton) {
 }
 
 void spread(Memory m, Slots) { spread_mimics<double>(m.ties.mimics(), m.work.delta); }
+void place(Memory m, Slots part) { placement_map(m.model.tree, m.constants, m.state.q, part, m.work.placement); }
 void move(Memory m, Slots part) { motion_map(m.model.tree, m.constants, m.work.delta, part, m.work.motion); }
 void find_coordinates(Memory m, Slots) { displacement_map(m.model.tree, m.work.motion, m.work.delta); }
 
@@ -343,6 +344,7 @@ void Writer::complete() {
       if (!m.finds_end_momenta) run(m, part);
     });
   };
+  add_unless_found("placement_map", "tree_placement, screw, q", "placement", place);
   add_unless_found("motion_map", "screw, delta", "motion", move);
   add_unless_found("displacement_down", "placement, motion", "displacement", [](Memory m, Slots part) {
     displacement_down(m.model.tree, m.work.placement, m.work.motion, part, m.work.displacement);
@@ -356,8 +358,7 @@ void Writer::complete() {
 }
 
 void Writer::arrival() {
-  add(When::arrival, "placement_map", "tree_placement, screw, q", "placement",
-      [](Memory m, Slots part) { placement_map(m.model.tree, m.constants, m.state.q, part, m.work.placement); }, Way::down);
+  add(When::arrival, "placement_map", "tree_placement, screw, q", "placement", place, Way::down);
   if (!draft_.strategy.gravity) return;
   add(When::arrival, "gravity_field_down", "placement", "field", [](Memory m, Slots part) {
     const std::array<double, 3>& g = m.options.gravity;

@@ -77,6 +77,7 @@ class ScheduleStepper {
     return now.norm <= tolerance * tolerance * now.scale ? 1 : 0;
   }
   Lanes at_floor(const Evaluated<double>& now, double epsilons) {
+    REQUIRE_FALSE(memory.strategy.shares_rows);  // there all bodies would be evaluated once more for this
     if (!below_ceiling(now.norm, now.energy, fall())) return 0;
     const Field<double>& inverse = memory.work.joint_inverse;
     const Field<double>& yields = memory.ties.empty() ? inverse : memory.ties.yields(inverse);
