@@ -1,29 +1,23 @@
 // bench/kernels.cpp
-// Time of every kernel, by its own name, over chains of hinges and of ball joints and over binary trees.
+// Time of every sweep of a step, by its own name in the schedule (engine/sweeps/schedule.hpp), over chains of hinges and of ball joints and
+// over binary trees.
 //
 //   build/release/bench/bench_kernels [--benchmark_filter=newton]
 //
-// First the kernels run once in the order of a step, and the result is checked against a plain twin; only then are they timed, on the
-// state of a moving system. Kernels that sum in place (impulse_up, residual_up, newton_factor_up, ...) are timed with what fills their input.
+// First the sweeps run once in the order of a step, and the result is checked against a plain twin; only then are they timed, on the
+// state of a moving system. Sweeps that sum in place (residual_up, innovation_up, ...) are timed with momentum_map, which fills their input.
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <set>
+#include <string>
 
 #include "bench/machine.hpp"
+#include "engine/effects/effect_plan.hpp"
 #include "engine/initial_state.hpp"
-#include "engine/simulation.hpp"
-#include "kernels/tree/advance_map.hpp"
-#include "kernels/tree/articulated_inertia_up.hpp"
-#include "kernels/tree/displacement_down.hpp"
-#include "kernels/tree/gravity.hpp"
-#include "kernels/tree/increment_down.hpp"
-#include "kernels/tree/momentum_map.hpp"
-#include "kernels/tree/momentum_update_map.hpp"
-#include "kernels/tree/motion_map.hpp"
-#include "kernels/tree/newton_factor_up.hpp"
-#include "kernels/tree/placement_map.hpp"
-#include "kernels/tree/residual_up.hpp"
-#include "kernels/tree/velocity_down.hpp"
+#include "engine/solve/stepper.hpp"
+#include "engine/sweeps/schedule.hpp"
+#include "engine/sweeps/step_memory.hpp"
 #include "models/build/generators.hpp"
 #include "tests/reference/del_literal.hpp"
 #include "tests/reference/dense_jacobian.hpp"
@@ -31,128 +25,82 @@
 namespace linden {
 namespace {
 
-constexpr double kStep = 1e-3;
+/// With these together every sweep is in some schedule.
+const Options kOptions[] = {{.step = 1e-3},
+                            {.step = 1e-3, .stop = StopTest::absolute},
+                            {.step = 1e-3, .solver = Solver::riqn, .guess = FirstGuess::ig3}};
 
-/// A moving system and the workspace of its next step, filled kernel by kernel.
+/// A moving system and the memory of its next step, evaluated sweep by sweep.
 struct Rig {
   Model model;
-  State<double> state;
-  Workspace<double> work;
-  Field<double> rate;
+  EffectPlan plan;
+  StepMemory memory;
+  std::vector<Sweep> sweeps;
 
-  explicit Rig(Model made) : model(std::move(made)) {
-    state.allocate(model.tree.shape);
-    work.allocate(model.tree.shape);
-    rate.allocate(model.tree.shape.velocities);
+  Rig(Model made, const Options& options)
+      : model(std::move(made)), plan(model, options, {}), memory(model, options, plan), sweeps(schedule_of(model, options, plan)) {
     const InitialState start = random_state(model, 1, 0.1);
+    State<double>& state = memory.state;
     std::ranges::copy(start.positions, state.q.flat().begin());
+    Field<double> rate;
+    rate.allocate(model.tree.shape.velocities);
     std::ranges::copy(start.velocities, rate.flat().begin());
-    for (Index row = 0; row < model.tree.shape.velocities; ++row) work.delta(row) = kStep * rate(row);
-    placement();
-    gravity();
-    velocity();
-    impulse_up(model.tree, model.constants, work.placement, work.impulse, state.p);
-    momentum_target_map(model.tree, kStep, state.p, work.force, work.momentum_target);
-    motion();
-    displacement();
-    momentum();
-    residual();
-    newton_factor();
-    pass_up();
-    increment();
+    const std::unique_ptr<Stepper> stepper = make_stepper(model, options, plan);
+    stepper->refresh(state);
+    stepper->momentum_of(rate, state.p);
+    memory.history = kHistory;
+    state.last_step(0) = options.step;
+    for (Index row = 0; row < rate.rows(); ++row) {
+      for (int k = 0; k < kHistory; ++k) state.history(row, k) = options.step * rate(row);
+    }
+    run(sweeps, {When::arrival}, memory);
+    memory.begin(0);
+    run(sweeps, {When::first}, memory);
+    memory.begin_evaluation(Factor::fresh);
+    run(sweeps, {When::evaluation, When::factor}, memory);
+    memory.share = 0;  // corrections by nothing: the state stays where it is
+    run(sweeps, {When::correction}, memory);
   }
 
-  Gains<double> gains() { return {work.gain_up, work.gain_down, work.joint_inverse}; }
-
-  void placement() { placement_map(model.tree, model.constants, state.q, work.placement); }
-  void gravity() {
-    gravity_field_down(model.tree, work.placement, Vec3<double>{0, 0, -9.81}, work.field);
-    gravity_force_up(model.tree, model.constants, work.placement, work.field, work.first_moment, work.force);
-  }
-  void velocity() {
-    velocity_down(model.tree, model.constants, work.placement, rate, work.variation);
-    momentum_of_map(model.tree, model.constants, work.variation, work.impulse);
-  }
-  void motion() { motion_map(model.tree, model.constants, work.delta, work.motion); }
-  void displacement() { displacement_down(model.tree, work.placement, work.motion, work.displacement); }
-  void momentum() {
-    momentum_map(model.tree, model.constants, work.displacement, work.impulse);
-  }
-  void residual() {
-    residual_up(model.tree, model.constants, work.placement, work.momentum_target, work.impulse, work.residual);
-  }
-  void newton_factor() {
-    newton_factor_up(model.tree, model.constants, work.placement, work.motion, work.displacement, work.articulated,
-                     gains());
-  }
-  void inertia_factor() { articulated_inertia_up(model.tree, model.constants, work.placement, work.articulated, gains()); }
-  void pass_up() {
-    impulse_pass_up(model.tree, model.constants, work.placement, gains(), work.residual, work.bias, work.innovation);
-  }
-  void increment() {
-    increment_down(model.tree, model.constants, work.placement, work.motion, gains(), work.innovation, work.variation,
-                   work.increment);
-  }
-  void rates() {
-    rate_down(model.tree, model.constants, work.placement, gains(), work.innovation, work.variation, work.increment);
-  }
-  void correction() { correct_motion_map(model.tree, model.constants, work.increment, 0.0, work.delta, work.motion); }
-  void update() {
-    momentum_update_map(model.tree, model.constants, kStep, work.displacement, work.impulse, work.residual, work.force, state.p);
-  }
-  void advance() { advance_map(model.tree, work.motion, work.delta, state.q); }
+  const Sweep& named(const std::string& name) const { return *std::ranges::find(sweeps, name, &Sweep::name); }
 };
 
-/// The kernels in the order of a step against the plain twin: residual by matrices, correction by a dense solve.
+/// The sweeps in the order of a step against the plain twin: residual by matrices, correction by a dense solve.
 bool agrees_with_plain_twin(Model model) {
-  Rig rig(std::move(model));
-  const reference::PlainTree tree = reference::plain_tree(rig.model);
+  Rig rig(std::move(model), kOptions[1]);
+  const Workspace<double>& work = rig.memory.work;
   const auto flat = [](const Field<double>& field) {
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(field.flat().data(), field.rows()));
   };
-  const Eigen::MatrixXd J = reference::dense_jacobian(rig.model, rig.work.placement, rig.work.motion);
-  const Eigen::VectorXd expected = J.fullPivLu().solve(flat(rig.work.residual));
-  const double error = (flat(rig.work.increment) - expected).norm() / expected.norm();
+  const Eigen::MatrixXd J = reference::dense_jacobian(rig.model, work.placement, work.motion);
+  const Eigen::VectorXd expected = J.fullPivLu().solve(flat(work.residual));
+  const double error = (flat(work.applied) - expected).norm() / expected.norm();
   if (error < 1e-9) return true;
   fmt::print(stderr, "{}: the correction differs from the dense solve by {:.2e}\n", rig.model.names.model, error);
   return false;
 }
 
-using Kernel = void (Rig::*)();
-struct Named {
-  const char* name;
-  std::vector<Kernel> kernels;
-};
-
-const std::vector<Named> kKernels{
-    {"placement_map", {&Rig::placement}},
-    {"gravity", {&Rig::gravity}},
-    {"motion_map", {&Rig::motion}},
-    {"displacement_down", {&Rig::displacement}},
-    {"momentum_map", {&Rig::momentum}},
-    {"momentum_map+residual_up", {&Rig::momentum, &Rig::residual}},
-    {"newton_factor_up", {&Rig::newton_factor}},
-    {"articulated_inertia_up", {&Rig::inertia_factor}},
-    {"impulse_pass_up", {&Rig::pass_up}},
-    {"increment_down", {&Rig::increment}},
-    {"rate_down", {&Rig::rates}},
-    {"correct_motion_map", {&Rig::correction}},
-    {"momentum_update_map", {&Rig::update}},
-    {"advance_map", {&Rig::advance}},
-    {"velocity_down", {&Rig::velocity}},
-};
+void register_one(const std::string& name, const std::string& shape, Model (*make)(Index), const Options& options, Index size) {
+  benchmark::RegisterBenchmark(fmt::format("{}/{}:{}", name, shape, size).c_str(), [=](benchmark::State& state) {
+    Rig rig(make(size), options);
+    const Slots all = all_slots(rig.model.tree);
+    const Sweep &momenta = rig.named("momentum_map"), &sweep = rig.named(name.substr(name.find('+') + 1));
+    for (auto _ : state) {
+      if (sweep.sums) momenta.run(rig.memory, all);
+      sweep.run(rig.memory, all);
+      benchmark::ClobberMemory();
+    }
+    per_body(state, size);
+  });
+}
 
 void register_all(const char* shape, Model (*make)(Index), const std::vector<Index>& sizes) {
-  for (const Named& named : kKernels) {
-    for (const Index size : sizes) {
-      benchmark::RegisterBenchmark(fmt::format("{}/{}:{}", named.name, shape, size).c_str(), [=](benchmark::State& state) {
-        Rig rig(make(size));
-        for (auto _ : state) {
-          for (const Kernel kernel : named.kernels) (rig.*kernel)();
-          benchmark::ClobberMemory();
-        }
-        per_body(state, size);
-      });
+  std::set<std::string> known;
+  for (const Options& options : kOptions) {
+    const Rig rig(make(sizes.front()), options);
+    for (const Sweep& sweep : rig.sweeps) {
+      if (sweep.when == When::start || !known.insert(sweep.name).second) continue;
+      for (const Index size : sizes) register_one((sweep.sums ? "momentum_map+" : "") + sweep.name, shape, make, options, size);
     }
   }
 }

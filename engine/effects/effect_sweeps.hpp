@@ -116,13 +116,17 @@ class EffectSweeps {
     return potential;
   }
 
+  /// A step of this length from these positions, before anything of it.
+  void set_out(double step, const Field<S>& q) {
+    h_ = as<S>(step);
+    q_ = &q;
+    creep_ = 0;
+  }
   /// A step from `times` on. delta: the first guess, moved into the limits. before: displacement of the step before, where it is `known`.
   /// passable: limits that joints bounce off, see limits.hpp.
   void begin(const LaneTimes<S>& times, double step, const Field<S>& q, const Field<S>& before, const MaskOf<S>& known, bool passable,
              Field<S>& delta) {
-    h_ = as<S>(step);
-    q_ = &q;
-    creep_ = 0;
+    set_out(step, q);
     const StepStart<S> start{times, step, before, known, passable};
     each_law(body_laws_, [&](auto& law) LINDEN_INLINE_LAMBDA { law.begin(start); });
     if (!plan_.joints) return;
@@ -234,15 +238,18 @@ class EffectSweeps {
     assemble();
   }
 
-  /// Impulses of the beginning become those of the end, but for being seen from the new poses.
   void end_bodies(const Field<S, 12>& placement, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
+    add_ends(placement, displacement, impulse);
+    each_law(body_laws_, [](auto& law) LINDEN_INLINE_LAMBDA { law.keep(); });
+  }
+  /// Impulses of the beginning become those of the end, but for being seen from the new poses.
+  void add_ends(const Field<S, 12>& placement, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
     const S rate = S(1.0) / h_;
     for (const TouchedBody& body : plan_.touched) {
       const auto D = load<Displacement, S>(displacement, body.slot);
       store(bodies_.uneven, body.slot, rate * carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
     }
     add_given_up(tree_, placement, bodies_.given, impulse);
-    each_law(body_laws_, [](auto& law) LINDEN_INLINE_LAMBDA { law.keep(); });
   }
 
   /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
@@ -374,37 +381,20 @@ class EffectSweeps {
     each_law(body_laws_, book);
     return account;
   }
-  /// Its kernels by their names in the schedule (sweeps.hpp), to be measured one by one in a step that has been evaluated: visit(name,
-  /// call). What the calls write is of no use.
-  template <class Element, class Visit>
-  void each_kernel(const BodyConstants<Element>& constants, Workspace<S>& work, Field<S>& end, const Visit& visit) {
-    each_law(joint_laws_, [&](auto& law) {
-      for (const PartSweep& sweep : law.sweeps) {
-        visit(sweep.name, [this, &law, &work, part = sweep.part] { call_part(law, part, work); });
-      }
-    });
-    each_law(body_laws_, [&](auto& law) {
-      for (const PartSweep& sweep : law.sweeps) {
-        visit(sweep.name, [this, &law, &constants, &work, part = sweep.part] { call_part(law, part, constants, work); });
-      }
-    });
-    if (plan_.joints) {
-      visit("joint_impulses_map", [this, &work] { joint_impulses_map(sum_, work.delta, work.momentum_target); });
-      visit("joint_impulses_end_map", [this, &work, &end] { joint_impulses_end_map(sum_, h_, work.delta, end); });
-    }
-    if (plan_.bodies) {
-      visit("add_given_up", [this, &work] { add_given_up(tree_, work.placement, bodies_.given, work.impulse); });
-      visit("world_placement_down", [this, &work] { world_placement_down(tree_, work.placement, bodies_.pose); });
-    }
-    visit("end_reading", [this, &constants, &work, &end] {
-      end_reading(constants, work.placement, S(0.0) < S(1.0), work.delta, work.delta, S(0.0) < S(1.0), work.impulse, end);
-    });
-  }
+  /// All that a step has of it, for who runs one sweep by sweep (engine/sweeps/schedule.hpp).
+  struct Parts {
+    JointLaws<S>& joint_laws;
+    BodyLaws<S>& body_laws;
+    JointImpulses<S>& joints;
+    BodyImpulses<S>& bodies;
+  };
+  Parts parts() { return {joint_laws_, body_laws_, sum_, bodies_}; }
+  /// The step that was set out.
+  StepView<S> view() const { return {{*q_, plan_.q_row, tree_}, h_, creep_}; }
   /// Taken from the work of the ground once the potential at the end is known.
   S ground_stored() const { return ground().stored(); }
 
  private:
-  StepView<S> view() const { return {{*q_, plan_.q_row, tree_}, h_, creep_}; }
   template <class Law>
   Law& law() {
     return std::get<Law>(joint_laws_);
@@ -435,32 +425,6 @@ class EffectSweeps {
     each_law(self.joint_laws_, look);
   }
 
-  static Revision<MaskOf<S>> settled() { return {S(0.0) < S(1.0), S(0.0) < S(1.0), S(1.0) < S(0.0), S(1.0) < S(0.0)}; }
-  template <class Law>
-  void call_part(Law& law, Part part, Workspace<S>& work) {
-    const StepView<S> view = this->view();
-    if (part == Part::begin) law.begin(view, StepStart<S>{{}, 0, work.delta, S(0.0) < S(1.0), false}, work.delta);
-    if (part == Part::add) law.add(view, sum_);
-    if (part == Part::evaluate) law.evaluate(view, work.motion, work.momentum_target);
-    if constexpr (Law::facts.has_states) {
-      if (part == Part::revise) law.revise(view, settled(), S(0.0), work.innovation, work.delta);
-    }
-  }
-  template <class Law, class Element>
-  void call_part(Law& law, Part part, const BodyConstants<Element>& constants, Workspace<S>& work) {
-    const StepView<S> view = this->view();
-    if constexpr (Law::facts.stores) {
-      if (part == Part::place) law.place(bodies_.pose);
-    }
-    if constexpr (Law::facts.has_states) {
-      if (part == Part::revise) law.revise(view, settled(), S(0.0), work.innovation, work.delta);
-    }
-    if (part != Part::add) return;
-    for (const TouchedBody& body : plan_.touched) {
-      const auto& [first, last] = body.ranges[kPlaceOf<Law, BodyLaws<S>>];
-      if (first < last) law.add(view, constants, first, last, work.displacement, bodies_, work.impulse);
-    }
-  }
   void clear_bodies() {
     for (Index i = 0; i < tree_.shape.slots; ++i) clear_body(bodies_, i);
   }

@@ -1,8 +1,7 @@
 #include "engine/guess/first_guess.hpp"
 
 #include "engine/guess/extrapolation.hpp"
-#include "kernels/tree/impulse_up.hpp"
-#include "kernels/tree/velocity_down.hpp"
+#include "engine/sweeps/tree_kernels.hpp"
 
 namespace linden {
 

@@ -19,8 +19,8 @@
 #include "engine/program/effects_text.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
+#include "engine/sweeps/schedule.hpp"
 #include "engine/sweeps/sweep_cost.hpp"
-#include "engine/sweeps/sweeps.hpp"
 #include "engine/text.hpp"
 #include "engine/version.hpp"
 #include "layout/state.hpp"
@@ -151,14 +151,14 @@ Index widest_level(const Tree& tree) {
 /// The sweeps of a step, and what all of it costs on this machine.
 struct Costs {
   std::vector<Sweep> sweeps;
-  std::vector<double> of_sweeps;    // [ns per body]; NaN where it is not one sweep
+  std::vector<double> of_sweeps;    // [ns per body]
   std::vector<EffectCost> effects;  // of a scene
 };
 
 Costs measure(const InspectArguments& arguments, const Model& model) {
   const EffectPlan plan(model, arguments.options, arguments.effects());
   Costs costs;
-  costs.sweeps = sweeps_of(model, arguments.options, plan);
+  costs.sweeps = schedule_of(model, arguments.options, plan);
   const InitialState start = arguments.scene ? arguments.scene->initial : InitialState();
   costs.of_sweeps = sweep_costs(model, arguments.options, plan, start, costs.sweeps);
   if (arguments.scene) costs.effects = effect_costs(*arguments.scene);
@@ -313,15 +313,14 @@ class Printer {
     std::string_view before;
     for (std::size_t k = 0; k < costs_.sweeps.size(); ++k) {
       const Sweep& sweep = costs_.sweeps[k];
-      const double cost = costs_.of_sweeps[k];
-      table.add({std::string(sweep.when == before ? "" : sweep.when), std::string(sweep.name),
-                 std::isfinite(cost) ? fmt::format("{:.2f}", cost) : "-", std::string(sweep.reads), std::string(sweep.writes)});
-      before = sweep.when;
+      const std::string_view when = name(sweep.when);
+      table.add({std::string(when == before ? "" : when), sweep.name, fmt::format("{:.2f}", costs_.of_sweeps[k]), sweep.reads, sweep.writes});
+      before = when;
     }
     say_text(table.text("  "));
-    say("  evaluation: of the first guess and after every correction; factor: where that of an earlier step does not\n"
-               "  serve, and again where a correction gains little.\n"
-               "  ns/body: of each sweep alone on this machine, over the whole tree\n");
+    say("  start: where no step before is known; evaluation: of the first guess and after every correction; factor: where\n"
+        "  that of an earlier step does not serve, and again where a correction gains little; arrival: at new positions, also\n"
+        "  where a motion starts; ns/body: of each sweep alone on this machine, over the whole tree\n");
   }
 
   void warnings() const {
@@ -402,8 +401,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
   Json& sweeps = result["sweeps"] = Json::array();
   for (std::size_t k = 0; k < costs.sweeps.size(); ++k) {
     const Sweep& sweep = costs.sweeps[k];
-    // a cost that was not measured becomes null
-    sweeps.push_back({{"when", sweep.when},
+    sweeps.push_back({{"when", linden::name(sweep.when)},
                       {"name", sweep.name},
                       {"ns_per_body", costs.of_sweeps[k]},
                       {"reads", sweep.reads},

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "engine/solve/diagnosis.hpp"
-#include "kernels/tree/motion_map.hpp"
+#include "engine/sweeps/tree_kernels.hpp"
 
 namespace linden {
 namespace {

@@ -8,8 +8,7 @@
 
 #include "engine/guess/first_guess.hpp"
 #include "engine/solve/diagnosis.hpp"
-#include "kernels/tree/momentum_update_map.hpp"
-#include "kernels/tree/motion_map.hpp"
+#include "engine/sweeps/tree_kernels.hpp"
 
 namespace linden {
 
@@ -33,6 +32,15 @@ TreeStepper<kEffects>::TreeStepper(const Model& model, const Options& options, c
 
 template <bool kEffects>
 StepReport TreeStepper<kEffects>::step(State<double>& state, int& history, double time, double h, Then then) {
+  const StepReport report = whole_step(state, history, time, h, then);
+#ifdef LINDEN_POISON
+  if (!unfinished_) sweeps_.poison_scratch();
+#endif
+  return report;
+}
+
+template <bool kEffects>
+StepReport TreeStepper<kEffects>::whole_step(State<double>& state, int& history, double time, double h, Then then) {
   StepReport report;
   time_ = time;
   clear_account();

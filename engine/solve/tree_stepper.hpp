@@ -51,6 +51,7 @@ class TreeStepper final : public Stepper {
   Energy energy_of(const State<double>& state, Field<double>& rate) override;
 
  private:
+  StepReport whole_step(State<double>& state, int& history, double time, double h, Then then);
   bool gains_energy(const State<double>& state, int history, double h, StepReport& report);
   void begin_effects(const State<double>& state, double h)
     requires kEffects;

@@ -1,6 +1,6 @@
 // engine/sweeps/strategy.hpp
 // How the sweeps of one tree are run: what follows from model, options and effects once and for all. The sweeps go by it, and so does whoever
-// lists them (sweeps.hpp).
+// lists them (schedule.hpp).
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,9 @@ enum class Order : std::uint8_t {
   branches,    // each branch down and up before the next branch (down_and_up.hpp)
   long_chain,  // as a whole, with momenta formed on the way up, where a factor reads inertias and displacements too
 };
+
+/// With which factor an evaluation's residual is to be solved.
+enum class Factor : std::uint8_t { fresh, kept };
 
 struct Strategy {
   bool gravity = false;        // else nothing is computed for it

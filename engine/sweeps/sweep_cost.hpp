@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "engine/initial_state.hpp"
-#include "engine/sweeps/sweeps.hpp"
+#include "engine/sweeps/schedule.hpp"
 
 namespace linden {
-/// [ns per body] for each of `sweeps`, which are those of this model, these options and this plan; NaN for what is not one sweep but
-/// several (solves for ties). `start` where the motion begins; empty: at rest in the zero configuration. Takes about a tenth of a second.
+/// [ns per body] for each of `sweeps`, which are those of this model, these options and this plan. `start` where the motion begins; empty:
+/// at rest in the zero configuration. Takes about a tenth of a second.
 std::vector<double> sweep_costs(const Model& model, const Options& options, const EffectPlan& plan, const InitialState& start,
                                 const std::vector<Sweep>& sweeps);
 

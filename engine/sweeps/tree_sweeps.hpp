@@ -41,9 +41,6 @@ struct EnergyStep {
   double before = 0, now = 0, work = 0;
 };
 
-/// With which factor an evaluation's residual is to be solved.
-enum class Factor : std::uint8_t { fresh, kept };
-
 /// kEffects: with those of the plan, beside gravity.
 template <bool kEffects>
 class TreeSweeps {
@@ -126,6 +123,9 @@ class TreeSweeps {
   void momentum_of(const Field<double>& v, Field<double>& p);
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
+  /// Fills with NaN what no sweep may read before it is written again, once a step is over and the next has not begun. Only where compiled
+  /// with LINDEN_POISON.
+  void poison_scratch();
   /// At the end of a step with effects: what velocities are read from beside p.
   void end_reading(const Field<double>& before, bool known) {
     if constexpr (kEffects) {
@@ -166,7 +166,7 @@ class TreeSweeps {
   template <class Down>
   void tie(const Gains<double>& gains, const Down& down);
   double pass_residual();
-  void pass_down();
+  void pass_down(Field<double>& correction);
   double momenta_of_delta(Field<double>& momenta);
   double slope_along(const Field<double>& innovation_before) const;
   double along(const Field<double>& correction) const;

@@ -46,7 +46,7 @@ template <class S>
 class ArmatureLaw : public JointLaw<S, Armature> {
  public:
   using JointLaw<S, Armature>::JointLaw;
-  static constexpr std::array sweeps{PartSweep{Part::add, "armature_map", "armature", "joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::add, "armature_map", "armature, joint impulses", "joint impulses"}};
   void add(const StepView<S>&, JointImpulses<S>& sum) const { armature_map(this->entries(), sum); }
   /// No force: it is a part of the mass matrix.
   static void push(const Armature&, const Instant&, Field<double>&) {}

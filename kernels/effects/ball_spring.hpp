@@ -87,8 +87,8 @@ template <class S>
 class BallSpringLaw : public JointLaw<S, BallSpring> {
  public:
   using JointLaw<S, BallSpring>::JointLaw;
-  static constexpr std::array sweeps{PartSweep{Part::add, "ball_spring_stiffness", "ball springs", "joint impulses"},
-                                     PartSweep{Part::evaluate, "ball_spring_map", "ball springs, q, motion", "momentum_target"}};
+  static constexpr std::array sweeps{PartSweep{Part::add, "ball_spring_stiffness", "ball springs, joint impulses", "joint impulses"},
+                                     PartSweep{Part::evaluate, "ball_spring_map", "ball springs, q, motion, momentum_target", "momentum_target"}};
   static bool on_ball(const BallSpring&, const LawSetup&) { return true; }
   void add(const StepView<S>& step, JointImpulses<S>& sum) const { ball_spring_stiffness(this->entries(), step.tree, step.h, sum); }
   void evaluate(const StepView<S>& step, const Field<S, 7>& motion, Field<S>& target) const {

@@ -40,7 +40,7 @@ void damping_loss(std::span<const JointDamping> dampers, std::span<const double>
 template <class S>
 class DampingLaw : public JointLaw<S, JointDamping> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::add, "damping_map", "damping", "joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::add, "damping_map", "damping, joint impulses", "joint impulses"}};
   explicit DampingLaw(const LawSetup& setup) : JointLaw<S, JointDamping>(setup) {
     for (const JointDamping& damper : this->entries()) share_.push_back(begin_share(ratio(damper, setup.step, setup.inertia_at(damper.row))));
   }

@@ -31,8 +31,8 @@ class DeadZoneSpringLaw : public JointLaw<S, DeadZoneSpring> {
  public:
   static constexpr std::array sweeps{
       PartSweep{Part::begin, "begin_dead_zones", "dead zones, q, delta", "dead zones"},
-      PartSweep{Part::add, "dead_zone_map", "dead zones, q", "joint impulses"},
-      PartSweep{Part::revise, "revise_dead_zones", "dead zones, q, delta", "dead zones, joint impulses"}};
+      PartSweep{Part::add, "dead_zone_map", "dead zones, q, joint impulses", "joint impulses"},
+      PartSweep{Part::revise, "revise_dead_zones", "dead zones, q, delta", "dead zones"}};
   static constexpr bool kFollows = true;
   explicit DeadZoneSpringLaw(const LawSetup& setup) : JointLaw<S, DeadZoneSpring>(setup) {
     mode_.allocate(static_cast<Index>(this->entries().size()));

@@ -53,7 +53,8 @@ void drag_map(Drags<S>& drags, std::size_t first, std::size_t last, const BodyCo
 template <class S>
 class DragLaw : public BodyLaw<S, Drag> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::add, "drag_map", "drag, pose, displacement", "impulse, body impulses"}};
+  static constexpr std::array sweeps{
+      PartSweep{Part::add, "drag_map", "inertia, drag, pose, displacement, impulse, body impulses", "impulse, body impulses"}};
   explicit DragLaw(const LawSetup& setup) : BodyLaw<S, Drag>(setup) {
     for (const Drag& drag : this->entries()) share_.push_back(begin_share(ratio(drag, setup.step, setup.mass_of(drag.slot))));
     drags_.entries = this->entries();

@@ -145,9 +145,9 @@ void friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& re
 template <class S>
 class FrictionLaw : public JointLaw<S, JointFriction> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_friction", "history, delta", "friction, delta"},
-                                     PartSweep{Part::add, "friction_map", "friction", "joint impulses"},
-                                     PartSweep{Part::revise, "revise_friction", "innovation, delta", "friction, delta, joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_friction", "before, delta", "friction, delta"},
+                                     PartSweep{Part::add, "friction_map", "friction, joint impulses", "joint impulses"},
+                                     PartSweep{Part::revise, "revise_friction", "residual, delta", "friction, delta"}};
   static constexpr bool kFollows = true;
   explicit FrictionLaw(const LawSetup& setup) : JointLaw<S, JointFriction>(setup) {
     frictions_.entries = this->entries();

@@ -90,7 +90,8 @@ inline constexpr double kComing = 1 - 1e-6;
 template <class S>
 class MotionLaw : public JointLaw<S, JointMotion> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::begin, "given_motion_map", "motions, time, q", "delta"}};
+  static constexpr std::array sweeps{PartSweep{Part::begin, "given_motion_map", "motions, time, q", "motions, delta"},
+                                     PartSweep{Part::add, "hold_motions", "motions, joint impulses", "joint impulses"}};
   explicit MotionLaw(const LawSetup& setup) : JointLaw<S, JointMotion>(setup), curves_(setup.curves) {
     motions_.entries = this->entries();
     for (Field<S>* field : {&motions_.end, &motions_.next_velocity, &motions_.velocity, &motions_.force, &motions_.steady}) {

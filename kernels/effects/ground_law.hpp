@@ -10,9 +10,13 @@ namespace linden {
 template <class S>
 class GroundLaw : public BodyLaw<S, Ground> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::add, "ground_map", "points, displacement", "points, impulse, body impulses"},
-                                     PartSweep{Part::revise, "revise_ground", "points", "points"},
-                                     PartSweep{Part::place, "find_ground", "pose", "points"}};
+  static constexpr std::array sweeps{
+      PartSweep{Part::begin, "begin_ground", "points", "points"},
+      PartSweep{Part::guess, "guess_ground", "points, displacement", "points"},
+      PartSweep{Part::add, "ground_map", "points, displacement, impulse, body impulses", "points, impulse, body impulses"},
+      PartSweep{Part::revise, "revise_ground", "points", "points"},
+      PartSweep{Part::keep, "keep_ground", "points", "points"},
+      PartSweep{Part::place, "find_ground", "pose", "points"}};
   explicit GroundLaw(const LawSetup& setup) : BodyLaw<S, Ground>(setup), plan_(setup.ground), friction_(as<S>(setup.ground.ground.friction)) {
     points_.allocate({.slots = static_cast<Index>(plan_.points.size())});
   }

@@ -3,12 +3,14 @@
 //
 //   place       where its bodies are now; potential
 //   begin       means of tables over the step; states (sticks? at its limit?) as the first guess suggests
+//   guess       of bodies: states as their displacement in the first evaluation suggests
 //   add         rows: impulses affine in the displacement (joint_impulses.hpp)     joints: when a step begins and when a state changed
 //               or forces at points of bodies (body_impulses.hpp)                  bodies: once an evaluation
 //   evaluate    of a joint: what is not affine in the displacement                 once an evaluation
 //   revise      states that belong to the solution so far: did one change?         once an evaluation
 //   account     energy that it took or gave
-//   end         of a joint: what p gets at the end beside its rows; what is kept for the next step
+//   end         of a joint: what p gets at the end beside its rows
+//   keep        what is kept for the next step
 //
 // Laws derive from JointLaw or BodyLaw, where every part stands with what it has to do, and write those parts anew that they have; the others
 // do nothing. Parts that the facts of their entries announce (layout/effects/facts.hpp) have to be there: require_parts. All laws stand in
@@ -84,9 +86,11 @@ struct Instant {
 };
 
 /// Which part of a law a sweep is.
-enum class Part : std::uint8_t { place, begin, add, evaluate, revise };
+enum class Part : std::uint8_t { place, begin, guess, add, evaluate, revise, keep };
 
-/// A part as the schedule of a step prints it: its kernel's name, and arrays by their names.
+/// A part as the schedule of a step has it (engine/sweeps/schedule.hpp): its kernel's name, and arrays by their names. Every part that a law
+/// has written anew is named among its `sweeps`, but for `end` and a joint's `keep`, which are parts of joint_impulses_end_map. `residual` is
+/// that of the joints as their solve left it.
 struct PartSweep {
   Part part;
   std::string_view name, reads, writes;

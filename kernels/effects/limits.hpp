@@ -140,8 +140,9 @@ void limit_loss(const Limits<S>& limits, const S& h, const Field<S>& residual, c
 template <class S>
 class LimitsLaw : public JointLaw<S, JointLimit> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_limits", "q, history, delta", "limits, delta"},
-                                     PartSweep{Part::revise, "revise_limits", "innovation, delta", "limits, delta, joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_limits", "q, before, delta", "limits, delta"},
+                                     PartSweep{Part::add, "hold_limits", "limits, joint impulses", "joint impulses"},
+                                     PartSweep{Part::revise, "revise_limits", "residual, delta", "limits, delta"}};
   explicit LimitsLaw(const LawSetup& setup) : JointLaw<S, JointLimit>(setup) {
     limits_.entries = this->entries();
     for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) field->allocate(static_cast<Index>(this->entries().size()));

@@ -99,8 +99,9 @@ S servo_work(const Servos<S>& servos, const Field<Index>& q_row, const S& h, con
 template <class S>
 class ServoLaw : public JointLaw<S, Servo> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::add, "servo_map", "servos, q", "joint impulses"},
-                                     PartSweep{Part::revise, "revise_servos", "servos, q, delta", "servos, joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_servos", "servos, time", "servos"},
+                                     PartSweep{Part::add, "servo_map", "servos, q, joint impulses", "joint impulses"},
+                                     PartSweep{Part::revise, "revise_servos", "servos, q, delta", "servos"}};
   static constexpr bool kFollows = true;
   explicit ServoLaw(const LawSetup& setup) : JointLaw<S, Servo>(setup) {
     servos_.entries = this->entries();

@@ -32,7 +32,7 @@ template <class S>
 class SpringLaw : public JointLaw<S, JointSpring> {
  public:
   using JointLaw<S, JointSpring>::JointLaw;
-  static constexpr std::array sweeps{PartSweep{Part::add, "spring_map", "springs, q", "joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::add, "spring_map", "springs, q, joint impulses", "joint impulses"}};
   void add(const StepView<S>& step, JointImpulses<S>& sum) const { spring_map(this->entries(), step.q_row, step.h, step.q, sum); }
   static S potential(const JointSpring& spring, const JointsView<S>& at) {
     const S stretch = at.q(at.q_row(spring.row)) - as<S>(spring.rest);

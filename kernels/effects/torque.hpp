@@ -36,7 +36,8 @@ S torque_work(std::span<const JointTorque> torques, const Field<S>& force, const
 template <class S>
 class TorqueLaw : public JointLaw<S, JointTorque> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::add, "torque_map", "torques, time", "joint impulses"}};
+  static constexpr std::array sweeps{PartSweep{Part::begin, "begin_torques", "torques, time", "torques"},
+                                     PartSweep{Part::add, "torque_map", "torques, joint impulses", "joint impulses"}};
   explicit TorqueLaw(const LawSetup& setup) : JointLaw<S, JointTorque>(setup) { force_.allocate(static_cast<Index>(this->entries().size())); }
   void begin(const StepView<S>&, const StepStart<S>& start, Field<S>&) {
     for (Index k = 0; k < force_.rows(); ++k) {

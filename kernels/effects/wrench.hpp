@@ -61,7 +61,9 @@ void wrench_map(Wrenches<S>& wrenches, std::size_t first, std::size_t last, cons
 template <class S>
 class WrenchLaw : public BodyLaw<S, BodyWrench> {
  public:
-  static constexpr std::array sweeps{PartSweep{Part::add, "wrench_map", "wrenches, pose, displacement", "impulse, body impulses"}};
+  static constexpr std::array sweeps{
+      PartSweep{Part::begin, "begin_wrenches", "wrenches, time", "wrenches"},
+      PartSweep{Part::add, "wrench_map", "wrenches, pose, displacement, impulse, body impulses", "impulse, body impulses"}};
   explicit WrenchLaw(const LawSetup& setup) : BodyLaw<S, BodyWrench>(setup) {
     wrenches_.entries = this->entries();
     for (Field<S>* field : {&wrenches_.scale, &wrenches_.work}) field->allocate(static_cast<Index>(this->entries().size()));

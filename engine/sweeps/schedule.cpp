@@ -1,0 +1,391 @@
+#include "engine/sweeps/schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/effects/effect_sweeps.hpp"
+#include "engine/guess/extrapolation.hpp"
+#include "engine/sweeps/effect_schedule.hpp"
+#include "engine/sweeps/step_memory.hpp"
+#include "engine/sweeps/tree_kernels.hpp"
+
+namespace linden {
+namespace {
+
+using Memory = StepMemory&;
+
+/// action(added): what effects and ties add to a factor; added: what effects do.
+template <class Added, class Action>
+void with_ties(Memory m, const Added& added, const Action& action) {
+  if (m.ties.empty()) return action(added);
+  action(m.ties.held(added));
+}
+
+void factor_mass(Memory m, Slots) {
+  const auto factor = [&](const auto& rotors) {
+    with_ties(m, rotors, [&](const auto& added) {
+      articulated_inertia_up(m.model.tree, m.constants, m.work.placement, m.work.articulated, m.mass_gains(), added);
+    });
+  };
+  if (m.effects) return m.effects->with_rotors(factor);
+  factor(NothingAdded{});
+}
+
+template <bool kNewton>
+void factor(Memory m, Slots part) {
+  const auto all = [&](const auto& effects) {
+    with_ties(m, effects, [&](const auto& added) {
+      if constexpr (kNewton) {
+        newton_factor_up(m.model.tree, m.constants, m.work.placement, m.work.motion, m.work.displacement, part, m.work.articulated,
+                         m.gains(), added);
+      } else {
+        articulated_inertia_up(m.model.tree, m.constants, m.work.placement, m.work.articulated, m.gains(), added);
+      }
+    });
+  };
+  if (m.effects) return m.effects->with_added(all);
+  all(NothingAdded{});
+}
+
+void pass_up(Memory m, const Gains<double>& gains, const Field<double>& right_side) {
+  m.now.norm = impulse_pass_up(m.model.tree, m.constants, m.work.placement, gains, right_side, m.work.bias, m.work.innovation);
+}
+void pass_down(Memory m, Field<double>& correction) {
+  increment_down(m.model.tree, m.constants, m.work.placement, m.work.motion, m.gains(), m.work.innovation, m.work.variation, correction);
+}
+void pass_down_mass(Memory m, const Gains<double>& gains, Field<double>& correction) {
+  rate_down(m.model.tree, m.constants, m.work.placement, gains, m.work.innovation, m.work.variation, correction);
+}
+
+/// What all joints do while a tied coordinate moves; newton: with the factor of the Jacobian, else with that of the mass matrix.
+void factor_ties(Memory m, const Gains<double>& gains, bool newton) {
+  m.ties.factor(
+      [&](const Field<double>& r, Field<double>& x) {
+        pass_up(m, gains, r);
+        newton ? pass_down(m, x) : pass_down_mass(m, gains, x);
+      },
+      [&](Index i) { return tied_load(m.model.tree, m.constants, gains, m.work.bias, m.work.variation, i); }, m.work.increment);
+}
+
+void spread(Memory m, Slots) { spread_mimics<double>(m.ties.mimics(), m.work.delta); }
+void place(Memory m, Slots part) { placement_map(m.model.tree, m.constants, m.state.q, part, m.work.placement); }
+void move(Memory m, Slots part) { motion_map(m.model.tree, m.constants, m.work.delta, part, m.work.motion); }
+void find_coordinates(Memory m, Slots) { displacement_map(m.model.tree, m.work.motion, m.work.delta); }
+
+Slots rows_of(Memory m, Slots part) { return velocities(m.model.tree, part); }
+
+/// An array of the memory, by its name.
+struct Array {
+  std::string name;
+  Field<double>& (*of)(Memory);
+};
+const Array kP{"p", [](Memory m) -> Field<double>& { return m.state.p; }};
+const Array kBefore{"before", [](Memory m) -> Field<double>& { return m.before; }};
+const Array kTarget{"momentum_target", [](Memory m) -> Field<double>& { return m.work.momentum_target; }};
+const Array kResidual{"residual", [](Memory m) -> Field<double>& { return m.work.residual; }};
+const Array kDelta{"delta", [](Memory m) -> Field<double>& { return m.work.delta; }};
+
+constexpr std::string_view kTies = "ties: a tree solve for each leader", kCompletion = "ties: completion";
+
+/// Writes the list phase by phase.
+class Writer {
+ public:
+  Writer(const Model& model, const Options& options, const EffectPlan& plan)
+      : draft_{model, options, plan, strategy_of(model, options, plan)} {}
+
+  std::vector<Sweep> list() {
+    first();
+    evaluation();
+    add_states_of_effects(draft_);
+    changed();
+    correction();
+    last();
+    return std::move(draft_.sweeps);
+  }
+
+ private:
+  template <class Run>
+  Sweep& add(When when, std::string_view name, std::string_view reads, std::string_view writes, const Run& run, Way way = Way::whole) {
+    Sweep& sweep = draft_.add(when, name, reads, writes, run);
+    sweep.way = way;
+    return sweep;
+  }
+  bool ties() const { return !draft_.model.mimics.empty(); }
+  bool newton() const { return draft_.options.solver == Solver::newton; }
+  bool one_pass() const { return draft_.strategy.one_pass; }
+
+  void first();
+  void guess();
+  void start();
+  void explicit_guess();
+  void factor_mass_matrix(When when);
+  void solve_mass_matrix(When when, const Array& right_side, const Array& solution);
+  void evaluation();
+  void residual_by_itself();
+  void changed();
+  void correction();
+  void last();
+  void complete();
+  void arrival();
+
+  ScheduleDraft draft_;
+};
+
+void Writer::first() {
+  add(When::first, "momentum_target_map", "p, force", "momentum_target", [](Memory m, Slots part) {
+    momentum_target_map(m.model.tree, m.options.step, m.state.p, m.work.force, part, m.work.momentum_target);
+  }, Way::down);
+  guess();
+  add_beginning_of_effects(draft_);
+  if (ties()) add(When::first, "spread_mimics", "delta", "delta", spread);
+  add(When::first, "motion_map", "screw, delta", "motion", move, Way::down);
+}
+
+void Writer::guess() {
+  constexpr std::string_view extrapolation_name = "first guess: extrapolation", ig1 = "first guess: ig1", ig2 = "first guess: ig2";
+  switch (draft_.options.guess) {
+    case FirstGuess::extrapolation:
+      add(When::first, extrapolation_name, "history", "delta", [](Memory m, Slots part) {
+        if (m.history > 0) extrapolate(extrapolation(m.state.history, m.history), m.state.history, rows_of(m, part), m.work.delta);
+      }, Way::down);
+      break;
+    case FirstGuess::ig1:
+      add(When::first, ig1, "", "delta", [](Memory m, Slots) { std::ranges::fill(m.work.delta.flat(), 0.0); });
+      break;
+    case FirstGuess::ig2:
+      add(When::first, ig2, "history", "delta", [](Memory m, Slots) {
+        for (Index row = 0; m.history > 0 && row < m.work.delta.rows(); ++row) m.work.delta(row) = m.state.history(row, 0);
+      });
+      break;
+    case FirstGuess::ig3: explicit_guess(); break;
+  }
+  if (draft_.plan.any() && draft_.options.order == 2) {
+    add(When::first, "last_displacement", "history, last_step", "before", [](Memory m, Slots) {
+      if (!m.is_known()) return;
+      const double longer = m.options.step / m.state.last_step(0);
+      for (Index row = 0; row < m.before.rows(); ++row) m.before(row) = longer * m.state.history(row, 0);
+    });
+  }
+  start();
+}
+
+/// Where no displacement is known yet: what momenta and forces alone would do, h M^-1 (p + h/2 Q), and to effects h M^-1 p.
+void Writer::start() {
+  const bool guesses = draft_.options.guess == FirstGuess::extrapolation || draft_.options.guess == FirstGuess::ig2;
+  if (!guesses && !draft_.plan.any()) return;
+  factor_mass_matrix(When::start);
+  if (guesses) solve_mass_matrix(When::start, kTarget, kDelta);
+  if (!draft_.plan.any()) return;
+  solve_mass_matrix(When::start, kP, kBefore);
+  add(When::start, "times_step", "before", "before", [](Memory m, Slots) {
+    for (double& value : m.before.flat()) value *= m.options.step;
+  });
+}
+
+/// delta = h (v + h M^-1 (Q - C)): semi-implicit Euler.
+void Writer::explicit_guess() {
+  factor_mass_matrix(When::first);
+  solve_mass_matrix(When::first, kP, kDelta);
+  add(When::first, "velocity_down", "screw, placement, delta", "twist",
+      [](Memory m, Slots) { velocity_down(m.model.tree, m.constants, m.work.placement, m.work.delta, m.work.twist); });
+  add(When::first, "coriolis_down", "inertia, screw, placement, delta, twist", "bias, impulse", [](Memory m, Slots) {
+    coriolis_down(m.model.tree, m.constants, m.work.placement, m.work.delta, m.work.twist, m.work.bias, m.work.impulse);
+  });
+  add(When::first, "impulse_up", "screw, placement, impulse", "impulse, residual", [](Memory m, Slots) {
+    impulse_up(m.model.tree, m.constants, m.work.placement, m.work.impulse, m.work.residual);
+  }).sums = true;
+  add(When::first, "force_difference", "force, residual", "residual", [](Memory m, Slots) {
+    for (Index row = 0; row < m.work.residual.rows(); ++row) m.work.residual(row) = m.work.force(row) - m.work.residual(row);
+  });
+  solve_mass_matrix(When::first, kResidual, kResidual);
+  add(When::first, "first guess: ig3", "delta, residual", "delta", [](Memory m, Slots) {
+    const double h = m.options.step;
+    for (Index row = 0; row < m.work.delta.rows(); ++row) m.work.delta(row) = h * (m.work.delta(row) + h * m.work.residual(row));
+  });
+}
+
+void Writer::factor_mass_matrix(When when) {
+  add(when, "articulated_inertia_up", "inertia, screw, placement", "articulated, mass gains", factor_mass);
+  if (!ties()) return;
+  add(when, kTies, "screw, placement, mass gains", "ties, bias, innovation, variation, increment",
+      [](Memory m, Slots) { factor_ties(m, m.mass_gains(), false); });
+}
+
+void Writer::solve_mass_matrix(When when, const Array& right_side, const Array& solution) {
+  add(when, "impulse_pass_up", "screw, placement, mass gains, " + right_side.name, "bias, innovation",
+      [of = right_side.of](Memory m, Slots) { pass_up(m, m.mass_gains(), of(m)); });
+  add(when, "rate_down", "screw, placement, mass gains, innovation", "variation, " + solution.name,
+      [of = solution.of](Memory m, Slots) { pass_down_mass(m, m.mass_gains(), of(m)); });
+  if (!ties()) return;
+  add(when, kCompletion, "ties, " + solution.name, solution.name, [of = solution.of](Memory m, Slots) { m.ties.complete(of(m)); });
+}
+
+void Writer::evaluation() {
+  add(When::evaluation, "displacement_down", "placement, motion", "displacement", [](Memory m, Slots part) {
+    m.now.least_w = std::min(m.now.least_w, displacement_down(m.model.tree, m.work.placement, m.work.motion, part, m.work.displacement));
+  }, Way::down);
+  add(When::evaluation, "momentum_map", "inertia, displacement", "impulse", [](Memory m, Slots part) {
+    m.now.energy += momentum_map(m.model.tree, m.constants, m.work.displacement, part, m.work.impulse);
+  }, draft_.strategy.order == Order::long_chain ? Way::parents_up : Way::down);
+  add_action_of_effects(draft_);
+  std::string added = draft_.plan.joints ? ", joint impulses" : "";
+  if (draft_.plan.bodies) added += ", body impulses";
+  if (newton()) {
+    const std::string reads = "inertia, screw, placement, motion, displacement" + added;
+    add(When::factor, "newton_factor_up", reads, "articulated, gains", factor<true>, Way::up);
+  } else {
+    add(When::factor, "articulated_inertia_up", "inertia, screw, placement" + added, "articulated, gains", factor<false>);
+  }
+  if (ties()) {
+    add(When::factor, kTies, newton() ? "screw, placement, motion, gains" : "screw, placement, gains",
+        "ties, bias, innovation, variation, increment",
+        [newton = newton()](Memory m, Slots) { factor_ties(m, m.gains(), newton); });
+  }
+  if (!one_pass()) return residual_by_itself();
+  add(When::evaluation, "innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation",
+      [](Memory m, Slots part) { m.now.norm += innovation_up(m.model.tree, m.constants, part, m.work); }, Way::up).sums = true;
+  if (!draft_.strategy.finds_end_momenta()) return;
+  add(When::evaluation, "momentum_at_end_map", "screw, displacement, impulse, innovation", "end_momentum", [](Memory m, Slots part) {
+    if (!m.finds_end_momenta) return;
+    momentum_at_end_map(m.model.tree, m.constants, m.work.displacement, m.work.impulse, m.work.innovation, part, m.work.end_momentum);
+  }, Way::up);
+}
+
+/// The residual, and the first half of a solve after it. Ties between joints make the whole solve necessary for the norm.
+void Writer::residual_by_itself() {
+  add(When::evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual", [](Memory m, Slots) {
+    m.now.plain = residual_up(m.model.tree, m.constants, m.work.placement, m.work.momentum_target, m.work.impulse, m.work.residual);
+  }).sums = true;
+  if (ties()) {
+    add(When::evaluation, "fold_mimics", "residual", "residual", [](Memory m, Slots) { fold_mimics(m.ties.mimics(), m.work.residual); });
+  }
+  add(When::evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation",
+      [](Memory m, Slots) { pass_up(m, m.gains(), m.work.residual); });
+  if (!ties()) return;
+  if (newton()) {
+    add(When::evaluation, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment",
+        [](Memory m, Slots) { pass_down(m, m.work.increment); });
+  } else {
+    add(When::evaluation, "rate_down", "screw, placement, gains, innovation", "variation, increment",
+        [](Memory m, Slots) { pass_down_mass(m, m.gains(), m.work.increment); });
+  }
+  add(When::evaluation, kCompletion, "ties, residual, increment", "increment", [](Memory m, Slots) {
+    m.ties.complete(m.work.increment);
+    double tied = 0;
+    for (Index row = 0; row < m.work.residual.rows(); ++row) tied += m.work.residual(row) * m.work.increment(row);
+    m.now.norm = std::abs(tied);
+  });
+}
+
+void Writer::changed() {
+  if (!draft_.plan.revises) return;
+  if (ties()) add(When::changed, "spread_mimics", "delta", "delta", spread);
+  add(When::changed, "displacement_map", "motion", "delta", find_coordinates);
+  add(When::changed, "motion_map", "screw, delta", "motion", move, Way::down);
+}
+
+void Writer::correction() {
+  if (one_pass()) {
+    add(When::correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, applied", [](Memory m, Slots part) {
+      increment_down(m.model.tree, m.constants, m.work.placement, m.work.motion, m.gains(), m.work.innovation, part, m.work.variation,
+                     m.work.applied);
+    }, Way::down);
+  } else if (ties()) {
+    add(When::correction, "swap_corrections", "increment, applied", "increment, applied",
+        [](Memory m, Slots) { std::ranges::swap_ranges(m.work.increment.flat(), m.work.applied.flat()); });
+  } else if (newton()) {
+    add(When::correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, applied",
+        [](Memory m, Slots) { pass_down(m, m.work.applied); });
+  } else {
+    add(When::correction, "rate_down", "screw, placement, gains, innovation", "variation, applied",
+        [](Memory m, Slots) { pass_down_mass(m, m.gains(), m.work.applied); });
+  }
+  add(When::correction, "correct_motion_map", "screw, applied, delta, motion", "delta, motion", [](Memory m, Slots part) {
+    correct_motion_map(m.model.tree, m.constants, m.work.applied, m.share, part, m.work.delta, m.work.motion);
+  }, Way::down);
+}
+
+void Writer::last() {
+  const bool quaternions = std::ranges::any_of(draft_.model.tree.runs, [](const Run& run) { return run.kind != JointKind::screw; });
+  if (quaternions) add(When::last, "displacement_map", "motion", "delta", find_coordinates);
+  add_end_of_effects(draft_);
+  if (draft_.strategy.shares_rows) complete();
+  add(When::last, "remember", "delta, history", "history",
+      [](Memory m, Slots part) { remember(m.work.delta, rows_of(m, part), m.state.history); }, Way::down);
+  add(When::last, "advance_map", "motion, delta, q", "q",
+      [](Memory m, Slots part) { advance_map(m.model.tree, m.work.motion, m.work.delta, part, m.state.q); }, Way::down);
+  if (ties()) {
+    add(When::last, "follow_leaders", "q", "q", [](Memory m, Slots) {
+      for (const Mimic& mimic : m.ties.mimics()) m.state.q(mimic.follower_q) = mimic.multiplier * m.state.q(mimic.leader_q) + mimic.offset;
+    });
+  }
+  arrival();
+  if (draft_.strategy.finds_end_momenta()) {
+    add(When::last, "momentum_end_map", "end_momentum, force", "p", [](Memory m, Slots part) {
+      if (m.finds_end_momenta) momentum_end_map(m.model.tree, m.options.step, m.work.end_momentum, m.work.force, part, m.state.p);
+    }, Way::up);
+  }
+  const std::string residual(draft_.joint_residual());
+  add(When::last, "momentum_update_map", "screw, displacement, impulse, force, " + residual, "p", [](Memory m, Slots part) {
+    if (m.finds_end_momenta) return;
+    momentum_update_map(m.model.tree, m.constants, m.options.step, m.work.displacement, m.work.impulse, m.joint_residual(), m.work.force,
+                        part, m.state.p);
+  }, Way::up);
+  add_arrival_of_effects(draft_);
+  add_impulses_of_effects(draft_);
+  if (ties()) add(When::last, "fold_mimics", "p", "p", [](Memory m, Slots) { fold_mimics(m.ties.mimics(), m.state.p); });
+  add_reading_of_effects(draft_);
+}
+
+/// Where branches share rows and momenta at the end were not found on the way, all is found once more for all bodies.
+void Writer::complete() {
+  const auto add_unless_found = [&](std::string_view sweep, std::string_view reads, std::string_view writes, auto run) {
+    add(When::last, sweep, reads, writes, [run](Memory m, Slots part) {
+      if (!m.finds_end_momenta) run(m, part);
+    });
+  };
+  add_unless_found("placement_map", "tree_placement, screw, q", "placement", place);
+  add_unless_found("motion_map", "screw, delta", "motion", move);
+  add_unless_found("displacement_down", "placement, motion", "displacement", [](Memory m, Slots part) {
+    displacement_down(m.model.tree, m.work.placement, m.work.motion, part, m.work.displacement);
+  });
+  add_unless_found("momentum_map", "inertia, displacement", "impulse", [](Memory m, Slots part) {
+    momentum_map(m.model.tree, m.constants, m.work.displacement, part, m.work.impulse);
+  });
+  add_unless_found("innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation",
+                   [](Memory m, Slots part) { innovation_up(m.model.tree, m.constants, part, m.work); });
+  draft_.sweeps.back().sums = true;
+}
+
+void Writer::arrival() {
+  add(When::arrival, "placement_map", "tree_placement, screw, q", "placement", place, Way::down);
+  if (!draft_.strategy.gravity) return;
+  add(When::arrival, "gravity_field_down", "placement", "field", [](Memory m, Slots part) {
+    const std::array<double, 3>& g = m.options.gravity;
+    gravity_field_down(m.model.tree, m.work.placement, Vec3<double>{g[0], g[1], g[2]}, part, m.work.field);
+  }, Way::down);
+  add(When::arrival, "gravity_force_up", "inertia, subtree_mass, screw, placement, field", "first_moment, force", [](Memory m, Slots part) {
+    gravity_force_up(m.model.tree, m.constants, m.work.placement, m.work.field, part, m.work.first_moment, m.work.force);
+  }, Way::up);
+}
+
+}  // namespace
+
+std::string_view name(When when) {
+  constexpr std::array<std::string_view, 9> names{"arrival", "first",   "start",      "evaluation", "factor",
+                                                  "states",  "changed", "correction", "last"};
+  return names[static_cast<std::size_t>(when)];
+}
+
+std::vector<Sweep> schedule_of(const Model& model, const Options& options, const EffectPlan& plan) {
+  return Writer(model, options, plan).list();
+}
+
+void run(std::span<const Sweep> sweeps, std::initializer_list<When> phases, StepMemory& memory) {
+  const Slots all = all_slots(memory.model.tree);
+  for (const Sweep& sweep : sweeps) {
+    if (std::ranges::find(phases, sweep.when) != phases.end()) sweep.run(memory, all);
+  }
+}
+
+}  // namespace linden
