@@ -154,7 +154,7 @@ void TreeSweeps<kEffects>::factor_again(Evaluated<double>& now, StepReport& repo
     now.norm = pass_residual();
     return;
   }
-  momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
+  now.energy = momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
   act(now);
   pass_up(now, Factor::fresh);
 }
