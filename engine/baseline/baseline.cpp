@@ -39,7 +39,26 @@ void add(const Field<double>& from, double factor, const Field<double>& more, Fi
   for (Index row = 0; row < to.rows(); ++row) to(row) = from(row) + factor * more(row);
 }
 
+/// What the effects of joints, or those of bodies, do at an instant. What is sudden has been refused.
+template <Site site, class Laws, class Now, class Sum>
+void push_all(const Effects& effects, const Now& now, Sum& sum) {
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    if constexpr (Entry::facts.site == site) {
+      using Law = typename LawFor<Entry, Laws>::type;
+      if constexpr (requires(const Entry& entry) { Law::push(entry, now, sum); }) {
+        for (const Entry& entry : entries) Law::push(entry, now, sum);
+      }
+    }
+  });
+}
+
 }  // namespace
+
+/// Of effects on bodies, which are asked for their potential as within a step.
+struct Baseline::BodyEffects {
+  explicit BodyEffects(const LawSetup& setup) : laws(laws_of<BodyLaws<double>>(setup)) {}
+  BodyLaws<double> laws;
+};
 
 std::string_view name(Scheme scheme) { return scheme == Scheme::rk4 ? "RK4" : "semi-implicit Euler"; }
 
@@ -59,7 +78,10 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
   for (Field<double>* field : {&v_, &good_v_, &stage_u_, &stage_v_, &rate_u_, &rate_v_, &sum_u_, &sum_v_})
     field->allocate(shape.velocities);
   work_.allocate(shape);
-  if (plan_->bodies) pose_.allocate(shape.slots);
+  if (plan_->bodies) {
+    pose_.allocate(shape.slots);
+    body_effects_ = std::make_unique<BodyEffects>(plan_->setup(model_->tree));
+  }
   std::ranges::copy(model_->neutral(), q_.flat().begin());
 }
 
@@ -93,49 +115,21 @@ void Baseline::place() {
       for (const Entry& entry : entries) potential_ += LawFor<Entry, JointLaws<double>>::type::potential(entry, at);
     }
   });
-}
-
-void Baseline::drive(double time, const Field<double>& v) {
-  const Instant now{time, q_, v, plan_->q_row, model_->tree};
-  Effects::each(plan_->effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
-    if constexpr (Entry::facts.site == Site::joint) {
-      using Law = typename LawFor<Entry, JointLaws<double>>::type;
-      if constexpr (requires(const Entry& entry) { Law::push(entry, now, work_.force); }) {
-        for (const Entry& entry : entries) Law::push(entry, now, work_.force);
-      }
-    }
+  if (!plan_->bodies) return;
+  world_placement_down(tree, work_.placement, pose_);
+  each_law(body_effects_->laws, [&]<class Law>(Law& law) {
+    if constexpr (Law::facts.stores) potential_ += law.place(pose_);
   });
 }
 
-static_assert(kBodyLaws == 3,
-              "Baseline::push_bodies knows wrenches and drag, and a ground is refused: say there what another law of bodies does");
+void Baseline::drive_joints(double time, const Field<double>& v) {
+  push_all<Site::joint, JointLaws<double>>(plan_->effects, Instant{time, q_, v, plan_->q_row, model_->tree}, work_.force);
+}
 
-void Baseline::push_bodies(double time) {
-  world_placement_down(model_->tree, work_.placement, pose_);
-  const auto vector = [](const std::array<double, 3>& from) { return Vec3<double>{from[0], from[1], from[2]}; };
-  const auto push = [&](Index slot, const Vec3<double>& point, const Vec3<double>& force, const Vec3<double>& moment) {
-    const Wrench<double> wrench{moment + cross(point, force), force};
-    store(work_.impulse, slot, load<Wrench, double>(work_.impulse, slot) - wrench);
-  };
-  for (const BodyWrench& wrench : plan_->effects.wrenches) {
-    const double share = wrench.share_at(time);
-    Vec3<double> force = share * vector(wrench.force), moment = share * vector(wrench.moment);
-    if (wrench.in_world) {
-      const auto R = load<Placement, double>(pose_, wrench.slot).R;
-      force = transpose_times(R, force);
-      moment = transpose_times(R, moment);
-    }
-    push(wrench.slot, vector(wrench.point), force, moment);
-  }
-  for (const Drag& drag : plan_->effects.drag) {
-    const auto G = load<Inertia, double>(model_->constants.inertia, drag.slot);
-    const Vec3<double> c = G.m > 0 ? (1 / G.m) * G.mc : Vec3<double>{0, 0, 0};
-    const auto V = load<Twist, double>(work_.twist, drag.slot);
-    const Vec3<double> air = transpose_times(load<Placement, double>(pose_, drag.slot).R, vector(plan_->effects.wind));
-    const Vec3<double> through = V.v + cross(V.w, c) - air;
-    const double b = drag.linear + drag.quadratic * std::sqrt(dot(through, through));
-    push(drag.slot, c, -b * through, {0, 0, 0});
-  }
+void Baseline::drive_bodies(double time) {
+  if (!plan_->bodies) return;
+  push_all<Site::body, BodyLaws<double>>(plan_->effects, BodiesInstant{time, pose_, work_.twist, model_->constants, plan_->effects},
+                                         work_.impulse);
 }
 
 void Baseline::accelerate(double time, const Field<double>& v, Field<double>& a) {
@@ -143,10 +137,10 @@ void Baseline::accelerate(double time, const Field<double>& v, Field<double>& a)
   const BodyConstants<double>& constants = model_->constants;
   evaluations_ += 1;
   place();
-  drive(time, v);
+  drive_joints(time, v);
   velocity_down(tree, constants, work_.placement, v, work_.twist);
   coriolis_down(tree, constants, work_.placement, v, work_.twist, work_.bias, work_.impulse);
-  if (plan_->bodies) push_bodies(time);
+  drive_bodies(time);
   impulse_up(tree, constants, work_.placement, work_.impulse, work_.residual);
   for (Index row = 0; row < v.rows(); ++row) work_.residual(row) = work_.force(row) - work_.residual(row);
   fold_mimics(ties_->mimics(), work_.residual);

@@ -8,8 +8,8 @@
 // Positions of ball and free joints move along exp of a body twist. RK4 takes its stages in the coordinates of that exp, u' = v
 // + 1/2 [u, v] + 1/12 [u, [u, v]], without which it would be of second order there (Munthe-Kaas).
 //
-// acts    gravity, armature, springs, damping, servos, torques, wrenches and drag, each as the force that it is at the time of an evaluation;
-//         friction, limits, servos with limited force and ground are refused: their forces change suddenly
+// acts    gravity, and every effect as the force that it is at the time of an evaluation: `push` of its law (kernels/effects/law.hpp). What changes
+//         suddenly, as its facts say, is refused: friction, limits, servos with limited force, given motions, ground
 // cost    an evaluation is some 150 ns a body, as much as a step of order 2 takes: placements, velocities, forces up, factor up,
 //         accelerations down
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3; Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8
@@ -60,12 +60,13 @@ class Baseline {
   Momentum momentum();
 
  private:
-  /// Placements and forces at q_.
+  struct BodyEffects;
+
+  /// Placements, forces of gravity and the potential of all at q_.
   void place();
-  /// Of effects, on top of those of place(), at the time of an evaluation.
-  void drive(double time, const Field<double>& v);
-  /// Wrenches and drag on bodies, taken from work_.impulse.
-  void push_bodies(double time);
+  /// Effects on joints, on top of the forces of place(), and on bodies, taken from work_.impulse: at the time of an evaluation.
+  void drive_joints(double time, const Field<double>& v);
+  void drive_bodies(double time);
   void accelerate(double time, const Field<double>& v, Field<double>& a);
   /// M(q) v into work_.residual; the system's momentum into slot 0 of work_.impulse.
   void find_momentum(const Field<double>& v);
@@ -80,6 +81,7 @@ class Baseline {
   Options options_;
   bool gravity_;
   std::unique_ptr<const EffectPlan> plan_;
+  std::unique_ptr<BodyEffects> body_effects_;  // where something acts on bodies
   double potential_ = 0;
   std::int64_t steps_ = 0, evaluations_ = 0;
   Field<double> q_, v_, good_q_, good_v_;

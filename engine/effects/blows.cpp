@@ -7,25 +7,32 @@
 namespace linden {
 namespace {
 
-/// Blows at one state: a row of joints that all stand at their limits passes an impulse to and fro some ten times.
-constexpr int kMostStrikes = 200;
+/// Blows at one state: joints that bounce off their limits may pass an impulse to and fro many times. From then on all stop.
+constexpr int kMostRounds = 200;
 
-/// Without restitution the last of a blow that others return is left to the next step, whose limits hold.
-constexpr double kLeastStrike = 1e-12;  // [rad/s, m/s]
+/// What is slower does not move [rad/s, m/s].
+constexpr double kLeastStrike = 1e-12;
+
+/// Changes of what is held in one blow: those after which one limit alone changes, and those after which it stays as it is, whatever rounding
+/// makes of it.
+constexpr int kLate = 10, kMostRevisions = 200;
 
 }  // namespace
 
-Blows::Blows(TreeSweeps<true>& sweeps, Index velocities) : sweeps_(sweeps) {
-  for (Field<double>* field : {&velocity_, &unit_, &response_}) field->allocate(velocities);
+Blows::Blows(TreeSweeps<true>& sweeps, Index velocities) : sweeps_(sweeps), bounds_(sweeps.effects().limits().entries.size()) {
+  for (Field<double>* field : {&velocity_, &change_, &impulse_, &response_}) field->allocate(velocities);
+}
+
+bool Blows::at_upper(const State<double>& state, const JointLimit& limit) const {
+  return limit.upper - state.q(sweeps_.effects().plan().q_row(limit.row)) <= kAtLimit;
+}
+bool Blows::at_lower(const State<double>& state, const JointLimit& limit) const {
+  return state.q(sweeps_.effects().plan().q_row(limit.row)) - limit.lower <= kAtLimit;
 }
 
 bool Blows::met(const State<double>& state) const {
-  const Limits<double>& limits = sweeps_.effects().limits();
-  const Field<Index>& q_row = sweeps_.effects().plan().q_row;
-  for (Index k = 0; k < limits.mode.rows(); ++k) {
-    const JointLimit& limit = limits.entries[static_cast<std::size_t>(k)];
-    const double q = state.q(q_row(limit.row));
-    const bool at_limit = limit.upper - q <= kAtLimit || q - limit.lower <= kAtLimit;
+  for (const JointLimit& limit : limits()) {
+    const bool at_limit = at_upper(state, limit) || at_lower(state, limit);
     if (state.last_step(0) == 0 && (at_limit || std::isfinite(limit.velocity))) return true;
     if (at_limit && (limit.restitution > 0 || std::abs(sweeps_.work().delta(limit.row)) > kAtLimit)) return true;
   }
@@ -34,59 +41,115 @@ bool Blows::met(const State<double>& state) const {
 
 double Blows::strike(State<double>& state, bool arrived, int& blows) {
   auto& effects = sweeps_.effects();
-  const Limits<double>& limits = effects.limits();
-  const Field<Index>& q_row = effects.plan().q_row;
-  if (arrived) {
-    for (const JointLimit& limit : limits.entries) {
-      if (std::abs(sweeps_.work().delta(limit.row)) > kAtLimit) effects.release(limit.row);
-    }
-  }
+  const auto arrives = [&](const JointLimit& limit) {
+    return (at_upper(state, limit) || at_lower(state, limit)) && std::abs(sweeps_.work().delta(limit.row)) > kAtLimit;
+  };
+  if (arrived && std::ranges::any_of(limits(), arrives)) effects.forget_bends();
   sweeps_.read_velocity(state.p, velocity_);
   double taken = 0;
   const int before = blows;
-  for (int blow = 0; blow < kMostStrikes; ++blow) {
-    const bool may_be_fast = blow > 0 || !arrived;  // else the step has seen to it
-    const JointLimit* fastest = nullptr;
-    double most = kLeastStrike, target = 0;  // of how much too fast a joint is; what the blow makes of its velocity
-    for (const JointLimit& limit : limits.entries) {
-      const double q = state.q(q_row(limit.row)), v = velocity_(limit.row);
-      const double into = limit.upper - q <= kAtLimit ? v : q - limit.lower <= kAtLimit ? -v : 0;
-      const double over = may_be_fast ? std::abs(v) - limit.velocity : 0;
-      if (std::max(into, over) <= most) continue;
-      most = std::max(into, over);
-      fastest = &limit;
-      target = into > kLeastBounce ? -limit.restitution * v : into > 0 ? 0 : std::copysign(limit.velocity, v);
+  for (int round = 0; round < kMostRounds; ++round) {
+    // that no joint is too fast before the first of them is seen to by the step
+    if (!find_bounds(state, round + 1 < kMostRounds, round > 0 || !arrived)) break;
+    solve();
+    for (std::size_t k = 0; k < bounds_.size(); ++k) {
+      const Index row = limits()[k].row;
+      if (bounds_[k].held == Held::no || impulse_(row) == 0) continue;
+      taken -= impulse_(row) * (velocity_(row) + 0.5 * change_(row));
+      state.p(row) += impulse_(row);
+      ++blows;
     }
-    if (fastest == nullptr) break;
-    const Index row = fastest->row;
-    std::ranges::fill(unit_.flat(), 0.0);
-    unit_(row) = 1;
-    if (blows > before) {
-      sweeps_.apply_mass_inverse(unit_, response_);
-    } else {
-      sweeps_.response_to(unit_, response_);
+    for (Index row = 0; row < velocity_.rows(); ++row) velocity_(row) += change_(row);
+    for (std::size_t k = 0; k < bounds_.size(); ++k) {
+      if (bounds_[k].held != Held::no) velocity_(limits()[k].row) = bounds_[k].velocity();
     }
-    const double impulse = (target - velocity_(row)) / response_(row);
-    taken -= impulse * (velocity_(row) + 0.5 * impulse * response_(row));
-    for (Index k = 0; k < velocity_.rows(); ++k) velocity_(k) += impulse * response_(k);
-    velocity_(row) = target;
-    state.p(row) += impulse;
-    ++blows;
   }
-  for (const JointLimit& limit : limits.entries) {
-    const double q = state.q(q_row(limit.row));
-    const bool at_limit = limit.upper - q <= kAtLimit || q - limit.lower <= kAtLimit;
-    if (at_limit && std::abs(velocity_(limit.row)) <= kLeastStrike) {
+  for (const JointLimit& limit : limits()) {
+    if ((at_upper(state, limit) || at_lower(state, limit)) && std::abs(velocity_(limit.row)) <= kLeastStrike) {
       velocity_(limit.row) = 0;
       effects.keep_still(limit.row);
     }
   }
   if (blows > before) {
     // what held a joint until the blow set it in motion is not in p
-    sweeps_.momentum_of(velocity_, unit_);
-    effects.read_as(unit_, state.p);
+    sweeps_.momentum_of(velocity_, impulse_);
+    effects.read_as(impulse_, state.p);
   }
   return taken;
+}
+
+bool Blows::find_bounds(const State<double>& state, bool may_bounce, bool may_be_fast) {
+  bool needed = false, bounces = false;
+  for (const JointLimit& limit : limits()) {
+    const double v = velocity_(limit.row);
+    const double into = std::max(at_upper(state, limit) ? v : 0, at_lower(state, limit) ? -v : 0);
+    needed = needed || into > kLeastStrike || (may_be_fast && std::abs(v) - limit.velocity > kLeastStrike);
+    bounces = bounces || (may_bounce && limit.restitution > 0 && into > kLeastBounce);
+  }
+  for (std::size_t k = 0; needed && k < bounds_.size(); ++k) bounds_[k] = bound(state, limits()[k], bounces);
+  return needed;
+}
+
+/// A joint between two limits that it stands at both is stopped, as one that bounces off neither.
+Blows::Bound Blows::bound(const State<double>& state, const JointLimit& limit, bool bounces) const {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  const double v = velocity_(limit.row);
+  const bool upper = at_upper(state, limit), lower = at_lower(state, limit);
+  const double away = bounces && upper != lower && std::abs(v) > kLeastBounce ? std::min(limit.restitution * std::abs(v), limit.velocity) : 0;
+  Bound result{lower ? (v < 0 ? away : 0) : -limit.velocity, upper ? (v > 0 ? -away : 0) : limit.velocity, Held::no};
+  // what would give energy is not asked as long as something bounces
+  if (bounces && v + result.low > kLeastStrike) result.low = -kAny;
+  if (bounces && v + result.high < -kLeastStrike) result.high = kAny;
+  // what rests at a bound is likely to be held there
+  if (v <= result.low + kLeastStrike) result.held = Held::low;
+  if (v >= result.high - kLeastStrike) result.held = Held::high;
+  return result;
+}
+
+void Blows::solve() {
+  for (int revision = 0; revision < kMostRevisions; ++revision) {
+    respond();
+    if (!revise(revision >= kLate)) return;
+  }
+}
+
+/// Where the joints that are held change by what is asked of them and no other feels an impulse: all changes of velocity, and the impulses.
+void Blows::respond() {
+  auto& effects = sweeps_.effects();
+  effects.begin_blow();
+  std::ranges::fill(change_.flat(), 0.0);
+  for (std::size_t k = 0; k < bounds_.size(); ++k) {
+    const Index row = limits()[k].row;
+    if (bounds_[k].held == Held::no) continue;
+    effects.hold_in_blow(row);
+    change_(row) = bounds_[k].velocity() - velocity_(row);
+  }
+  spread_mimics<double>(sweeps_.mimics(), change_);
+  sweeps_.momentum_of(change_, impulse_);
+  for (double& impulse : impulse_.flat()) impulse = -impulse;
+  sweeps_.response_to(impulse_, response_);
+  for (Index row = 0; row < change_.rows(); ++row) change_(row) += response_(row);
+  sweeps_.momentum_of(change_, impulse_);
+}
+
+/// Limits that would have to pull let go, and what passes a bound is held there; one_by_one: the last of them alone, which never goes round in
+/// circles (Murty's rule, as in limits.hpp). Returns whether something changed.
+bool Blows::revise(bool one_by_one) {
+  bool changed = false;
+  for (std::size_t k = bounds_.size(); k-- > 0 && !(one_by_one && changed);) {
+    Bound& bound = bounds_[k];
+    const Index row = limits()[k].row;
+    const double after = velocity_(row) + change_(row);
+    Held held = bound.held;
+    if (held == Held::no) {
+      held = after > bound.high + kLeastStrike ? Held::high : after < bound.low - kLeastStrike ? Held::low : Held::no;
+    } else if (held == Held::high ? impulse_(row) > 0 : impulse_(row) < 0) {
+      held = Held::no;
+    }
+    changed = changed || held != bound.held;
+    bound.held = held;
+  }
+  return changed;
 }
 
 double Blows::passed(const State<double>& state) const {

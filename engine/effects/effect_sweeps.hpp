@@ -33,6 +33,9 @@ inline constexpr double kHeld = 1e36, kMostRead = 1e35;
 /// of the step before it. Half as much is what a steady acceleration makes.
 inline constexpr double kMostBend = 1.5;
 
+/// What becomes of a joint that a limit has stopped within a step: it rests there, or is struck there next (blows.hpp), and so let go of.
+enum class Stopped : unsigned char { rests, struck };
+
 template <class S>
 class EffectSweeps {
  public:
@@ -74,15 +77,8 @@ class EffectSweeps {
     if (rotors_.rows() == 0) return action(NothingAdded{});
     action(EffectsAdded<S, true, false>{rotors_, bodies_.pull});
   }
-  /// And for what a blow does: a joint whose motion is given goes on as it does.
-  template <class Action>
-  void with_struck(const Action& action) {
-    if (motions().entries.empty()) return with_rotors(action);
-    for (Index row = 0; row < reading_stiffness_.rows(); ++row) reading_stiffness_(row) = rotors_.rows() > 0 ? rotors_(row) : S(0.0);
-    for (const JointMotion& motion : motions().entries) reading_stiffness_(motion.row) = as<S>(std::numeric_limits<double>::infinity());
-    action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
-  }
-  /// And for the mass matrix that velocities are read with, after begin_reading: a joint that is held is taken out.
+  /// And for the mass matrix that velocities are read with, after begin_reading, or that a blow is found with, after begin_blow: joints that
+  /// are held are taken out.
   template <class Action>
   void with_reading(const Action& action) const {
     action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
@@ -253,8 +249,9 @@ class EffectSweeps {
   }
 
   /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
-  void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Field<S>& residual, Field<S>& end) {
+  void end_joints(const Field<S>& delta, const Field<S, 7>& motion, Stopped stopped, Field<S>& residual, Field<S>& end) {
     using std::abs;
+    const S farthest = as<S>(stopped == Stopped::struck ? kAtLimit : std::numeric_limits<double>::infinity());
     const S half(0.5), rate = S(1.0) / h_;
     joint_impulses_end_map(sum_, h_, delta, end);
     evaluate_end(motion, end);
@@ -264,7 +261,7 @@ class EffectSweeps {
       S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
       if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
       const auto held = sum_.stiffness(row) > most;
-      S excess = select(held, as<S>(kHeld), rate * uneven);
+      S excess = select(held && abs(delta(row)) <= farthest, as<S>(kHeld), rate * uneven);
       if (plan_.fastest.rows() > 0) {
         // what holds a joint at its limit of velocity acts on, all of it at the beginning
         const auto at_speed = held && delta(row) != zero && abs(delta(row)) == h_ * as<S>(plan_.fastest(row));
@@ -317,6 +314,12 @@ class EffectSweeps {
     const S fastest = as<S>(plan_.fastest(row));
     return min(max(v, -fastest), fastest);
   }
+  /// Prepares with_reading for a blow: joints whose motion is given go on as they do; others are held one by one.
+  void begin_blow() {
+    for (Index row = 0; row < reading_stiffness_.rows(); ++row) reading_stiffness_(row) = rotors_.rows() > 0 ? rotors_(row) : S(0.0);
+    for (const JointMotion& motion : motions().entries) hold_in_blow(motion.row);
+  }
+  void hold_in_blow(Index row) { reading_stiffness_(row) = as<S>(std::numeric_limits<double>::infinity()); }
   /// Adds to p what velocities are read from beside it, and prepares with_reading.
   void begin_reading(Field<S>& p) {
     const S most = as<S>(kMostRead), zero(0.0), infinite = as<S>(std::numeric_limits<double>::infinity());
@@ -334,16 +337,15 @@ class EffectSweeps {
       if (reading_(given.row(k)) > S(kMostRead)) v(given.row(k)) = given.velocity(k);
     }
   }
-  /// A joint that was held is to be struck; one that was struck has come to rest.
-  void release(Index row) {
-    if (reading_(row) > S(kMostRead)) reading_(row) = S(0.0);
-  }
+  /// A joint that was struck has come to rest.
   void keep_still(Index row) { reading_(row) = S(kHeld); }
+  /// Velocities have changed at once: nothing is known of how the motion bends.
+  void forget_bends() { std::ranges::fill(bend_.flat(), S(kAnyBend)); }
   /// A blow has changed all velocities to those of these momenta.
   void read_as(const Field<S>& momentum, const Field<S>& p) {
     for (Index row = 0; row < p.rows(); ++row) reading_(row) = momentum(row) - p(row);
     for (const JointMotion& motion : motions().entries) reading_(motion.row) = S(kHeld);
-    std::ranges::fill(bend_.flat(), S(kAnyBend));
+    forget_bends();
   }
   const Limits<S>& limits() const { return law<LimitsLaw<S>>().limits(); }
   /// What acts in the step that was solved last, until it is ended (engine/effects/step_impulses.hpp).

@@ -134,7 +134,7 @@ class LaneEffects {
   /// The end of a step, of the lanes that took it together: impulses on bodies now, those of joints by add_end once the momenta are there.
   void end(const Block<Real>& block, Lanes done, Workspace<Pack>& work) {
     const Mask moves = L::mask(done);
-    if (done != 0 && sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, work.innovation, end_);
+    if (done != 0 && sweeps_.plan().joints) sweeps_.end_joints(work.delta, work.motion, Stopped::rests, work.innovation, end_);
     if (done != 0 && sweeps_.plan().bodies) sweeps_.end_bodies(work.placement, work.displacement, work.impulse);
     for (Index k = 0; k < sweeps_.plan().kept(); ++k) {
       const Pack ended = select(moves, sweeps_.kept(k), L::load(block.kept + k * W));

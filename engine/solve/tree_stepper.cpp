@@ -328,7 +328,9 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
     if (impulses_.kept()) {
       impulses_.add(effects_, model_, h, state.q, work_.placement, work_.motion, work_.delta, sweeps_.joint_residual());
     }
-    if (effects_.plan().joints) effects_.end_joints(work_.delta, work_.motion, sweeps_.joint_residual(), work_.end_impulse);
+    if (effects_.plan().joints) {
+      effects_.end_joints(work_.delta, work_.motion, Stopped::struck, sweeps_.joint_residual(), work_.end_impulse);
+    }
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
   history = std::min(history + 1, kHistory);

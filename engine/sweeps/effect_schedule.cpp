@@ -150,7 +150,8 @@ void add_end_of_effects(ScheduleDraft& draft) {
   if (draft.plan.joints) {
     draft.add(When::last, "joint_impulses_end_map", "joint impulses, delta, motion, q, " + residual, "end_impulse, " + residual,
               [](StepMemory& memory, Slots) {
-                memory.effects->end_joints(memory.work.delta, memory.work.motion, memory.joint_residual(), memory.work.end_impulse);
+                memory.effects->end_joints(memory.work.delta, memory.work.motion, Stopped::struck, memory.joint_residual(),
+                                            memory.work.end_impulse);
               });
   }
   if (!draft.plan.bodies) return;

@@ -101,7 +101,7 @@ void TreeSweeps<kEffects>::velocity_of(const Field<double>& p, Field<double>& v)
 template <bool kEffects>
 void TreeSweeps<kEffects>::response_to(const Field<double>& impulse, Field<double>& v) {
   if constexpr (kEffects) {
-    effects_.with_struck([&](const auto& added) { factor_mass(added); });
+    effects_.with_reading([&](const auto& added) { factor_mass(added); });
     apply_mass_inverse(impulse, v);
   }
 }

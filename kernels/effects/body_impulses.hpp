@@ -40,11 +40,17 @@ void clear_body(BodyImpulses<S>& sum, Index i) {
   for (int k = 0; k < 36; ++k) sum.pull(i, k) = S(0.0);
 }
 
+/// impulse_i -= wrench
+template <class S>
+LINDEN_INLINE void take_wrench(Field<S, 6>& impulse, Index i, const Wrench<S>& wrench) {
+  store(impulse, i, load<Wrench, S>(impulse, i) - wrench);
+}
+
 /// h^2 x wrenches of the beginning and of both ends; uneven: (s - 1/2) x both, where it acts at the end of the step.
 template <class S>
 LINDEN_INLINE void add_wrenches(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const Wrench<S>& begin, const Wrench<S>& both,
                                 const Wrench<S>& uneven) {
-  store(impulse, i, load<Wrench, S>(impulse, i) - begin);
+  take_wrench(impulse, i, begin);
   store(sum.given, i, load<Wrench, S>(sum.given, i) + both);
   store(sum.uneven, i, load<Wrench, S>(sum.uneven, i) + uneven);
 }

@@ -76,6 +76,15 @@ class DragLaw : public BodyLaw<S, Drag> {
            const Field<S, 7>& displacement, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
     drag_map(drags_, first, last, constants, step.h, displacement, sum, impulse);
   }
+  static void push(const Drag& drag, const BodiesInstant& now, Field<double, 6>& impulse) {
+    const auto G = load<Inertia, double>(now.constants.inertia, drag.slot);
+    const Vec3<double> c = G.m > 0 ? (1 / G.m) * G.mc : Vec3<double>{0, 0, 0};
+    const auto V = load<Twist, double>(now.twist, drag.slot);
+    const Vec3<double> wind{now.effects.wind[0], now.effects.wind[1], now.effects.wind[2]};
+    const Vec3<double> v = V.v + cross(V.w, c) - transpose_times(load<Placement, double>(now.pose, drag.slot).R, wind);
+    const Vec3<double> force = -(drag.linear + drag.quadratic * std::sqrt(dot(v, v))) * v;
+    take_wrench(impulse, drag.slot, Wrench<double>{cross(c, force), force});
+  }
   void account(const StepView<S>&, const SolvedStep<S>&, const auto& book) const {
     for (Index k = 0; k < drags_.loss.rows(); ++k) book(drags_.entries[static_cast<std::size_t>(k)].slot, drags_.loss(k));
   }

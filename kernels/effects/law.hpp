@@ -29,6 +29,7 @@
 #include "kernels/effects/joint_impulses.hpp"
 #include "kernels/effects/lane_times.hpp"
 #include "kernels/effects/law_setup.hpp"
+#include "layout/body_constants.hpp"
 
 namespace linden {
 
@@ -83,6 +84,15 @@ struct Instant {
   const Field<double>&q, &v;
   const Field<Index>& q_row;
   const Tree& tree;
+};
+
+/// Bodies at one instant, likewise.
+struct BodiesInstant {
+  double time;                      // [s]
+  const Field<double, 12>& pose;    // body -> world
+  const Field<double, 6>& twist;    // angular [rad/s], linear [m/s], body frame
+  const BodyConstants<double>& constants;
+  const Effects& effects;           // of which some have a number that is no entry's, as the wind
 };
 
 /// Which part of a law a sweep is.
@@ -177,8 +187,10 @@ class JointLaw : public LawOf<S, E> {
 ///   static std::span<const ...> touching(const LawSetup&);      what it has on bodies, sorted by their slots
 ///   void add(const StepView<S>&, const BodyConstants<...>&, std::size_t first, std::size_t last, const Field<S, 7>& displacement,
 ///            BodyImpulses<S>&, Field<S, 6>& impulse);           of [first, last) of these, all on one body
-/// and what its facts demand: S place(const Field<S, 12>& pose) where it .stores, revise and account as a law of joints; book(slot, joules).
-/// It may have a ratio, of a body's mass.
+/// and what its facts demand: S place(const Field<S, 12>& pose) where it .stores, revise and account as a law of joints; book(slot, joules); and
+///   static void push(const Entry&, const BodiesInstant&, Field<double, 6>& impulse);                   unless all of it is .sudden
+/// which, like `add`, takes what acts on a body, moment about its origin and force in its frame, from what is there (take_wrench). It may have a
+/// ratio, of a body's mass.
 template <class S, class E>
 class BodyLaw : public LawOf<S, E> {
  public:

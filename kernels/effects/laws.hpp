@@ -137,6 +137,11 @@ consteval void require_body_parts() {
     static_assert(requires(Law& law, const Field<S, 12>& pose) { { law.place(pose) } -> std::same_as<S>; },
                   "the facts say that the effect stores energy: give its law `place`, as in law.hpp");
   }
+  if constexpr (facts.sudden.empty() || requires(const typename Law::Entry& entry) { entry.settles(); }) {
+    static_assert(requires(const typename Law::Entry& entry, const BodiesInstant& now, Field<double, 6>& impulse) {
+      Law::push(entry, now, impulse);
+    }, "what is not sudden is a force at every instant: give the law `push`, as in law.hpp, or say in its facts what is sudden");
+  }
 }
 
 /// Every law has its parts, and every list of Effects one law.

@@ -81,6 +81,17 @@ class WrenchLaw : public BodyLaw<S, BodyWrench> {
            BodyImpulses<S>& sum, Field<S, 6>& impulse) {
     wrench_map(wrenches_, first, last, step.h, displacement, sum, impulse);
   }
+  static void push(const BodyWrench& wrench, const BodiesInstant& now, Field<double, 6>& impulse) {
+    const auto vector = [](const std::array<double, 3>& from) { return Vec3<double>{from[0], from[1], from[2]}; };
+    const double share = wrench.share_at(now.time);
+    Vec3<double> force = share * vector(wrench.force), moment = share * vector(wrench.moment);
+    if (wrench.in_world) {
+      const auto R = load<Placement, double>(now.pose, wrench.slot).R;
+      force = transpose_times(R, force);
+      moment = transpose_times(R, moment);
+    }
+    take_wrench(impulse, wrench.slot, Wrench<double>{moment + cross(vector(wrench.point), force), force});
+  }
   void account(const StepView<S>&, const SolvedStep<S>&, const auto& book) const {
     for (Index k = 0; k < wrenches_.work.rows(); ++k) book(wrenches_.entries[static_cast<std::size_t>(k)].slot, wrenches_.work(k));
   }

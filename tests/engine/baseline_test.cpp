@@ -6,6 +6,7 @@
 #include "layout/support/input_error.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"
+#include "tests/reference/plain_scene.hpp"
 
 namespace linden {
 namespace {
@@ -62,6 +63,30 @@ TEST_CASE("baselines know rotors and springs") {
   CHECK(distance(end_of(balls, Scheme::rk4, 5e-4, 0.192, 0.2, pulled), exact(balls, 0.192, 0.2, pulled)) < 1e-5);
 }
 
+TEST_CASE("baselines know what acts on bodies, in wind and over time, as the plain simulator does") {
+  const Model model = random_tree({.bodies = 6, .seed = 4});
+  const InitialState start = random_state(model, 3, 0.5);
+  Effects effects;
+  effects.wind = {0.5, -1, 0.3};
+  effects.drag = {{.slot = 2, .linear = 0.2, .quadratic = 0.1}, {.slot = 5, .linear = 0.1}};
+  effects.wrenches = {{.slot = 1, .point = {0.1, 0, 0.2}, .force = {1, 2, -1}, .moment = {0.1, 0, 0.2}, .scale = {{0, 0.2}, {0, 1}}},
+                      {.slot = 5, .point = {0, 0.1, 0}, .force = {0.5, -1, 0.5}, .moment = {0, 0.05, 0}, .in_world = false}};
+  const auto away = [&](const Effects& acting) {
+    reference::PlainScene plain(model, acting, Options{}.gravity);
+    plain.start(Eigen::Map<const Eigen::VectorXd>(start.positions.data(), static_cast<Eigen::Index>(start.positions.size())),
+                Eigen::Map<const Eigen::VectorXd>(start.velocities.data(), static_cast<Eigen::Index>(start.velocities.size())));
+    plain.advance(0.192, 400);
+    return distance(end_of(model, Scheme::rk4, 1e-3, 0.192, 0.5, effects), std::vector<double>(plain.q.begin(), plain.q.end()));
+  };
+  CHECK(away(effects) < 1e-7);
+  Effects fewer = effects;
+  fewer.wind = {0, 0, 0};
+  CHECK(away(fewer) > 1e-4);
+  fewer = effects;
+  fewer.wrenches[1].in_world = true;
+  CHECK(away(fewer) > 1e-4);
+}
+
 TEST_CASE("energy and momentum of a baseline are those of the same state in a simulation") {
   const Model model = load_urdf(model_file("humanoid.urdf"), Base::floating);
   Simulation simulation(model);
@@ -93,6 +118,9 @@ TEST_CASE("what a baseline does not have is refused") {
   effects.friction = urdf_friction(*arm);
   REQUIRE(!effects.friction.empty());
   CHECK_THROWS_AS(Baseline(arm, Scheme::rk4, {}, effects), InputError);
+  Effects ground;
+  ground.ground = Ground{};
+  CHECK_THROWS_WITH(Baseline(arm, Scheme::rk4, {}, ground), "RK4 has no forces that change suddenly; the scene has ground");
   Baseline baseline(arm, Scheme::rk4, {});
   CHECK_THROWS_WITH(baseline.set(std::vector<double>(3), std::vector<double>(3)), Catch::Contains("expected"));
 }

@@ -8,6 +8,7 @@
 #include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
+#include "tests/reference/plain_scene.hpp"
 
 namespace linden {
 namespace {
@@ -141,6 +142,89 @@ TEST_CASE("a blow leaves no joint faster than its limit of velocity, nor one tha
     }
     CHECK(struck);
     CHECK(simulation.passive_gifts().empty());
+  }
+}
+
+TEST_CASE("what rests on a limit stays there while another joint bounces, as long as its limit has to push", "[blows]") {
+  // a blow on the second of two links throws the first one up
+  for (const double e : {0.0, 0.6, 1.0}) {
+    Effects effects = limited(2, 0.3, e);
+    for (const bool into : {true, false}) {
+      Simulation simulation(links_in_a_row(2), weightless(1e-6), effects);
+      simulation.set_positions(std::vector<double>{into ? 0.3 : -0.3, 0.3});
+      simulation.set_velocities(std::vector<double>{0, 1.3});
+      const double before = simulation.energy().kinetic;
+      run(simulation, 1);
+      CHECK(simulation.velocities()[1] == Approx(-e * 1.3).margin(1e-5));
+      if (into) CHECK(simulation.velocities()[0] == 0);
+      if (!into) CHECK(simulation.velocities()[0] > 0.1);
+      CHECK(simulation.energy().kinetic + simulation.effect_work().of<JointLimit>() == Approx(before).epsilon(1e-5));
+      if (into) CHECK(simulation.energy().kinetic == Approx(e * e * before).margin(1e-5 * before));
+    }
+  }
+}
+
+TEST_CASE("of many joints that are stopped at once no limit pulls, and none that pushes lets its joint go", "[blows]") {
+  // v+ - v = M^-1 lambda, by the plain mass matrix; some joints move into limits, some rest on them, some leave them
+  const int joints = 12;
+  const Model model = links_in_a_row(joints);
+  for (int trial = 0; trial < 20; ++trial) {
+    Effects effects = limited(joints, 0.3, 0);
+    effects.limits[5].velocity = 0.1;
+    Simulation simulation(model, weightless(1e-8), effects);
+    std::vector<double> q, v;
+    for (int k = 0; k < joints; ++k) {
+      const int turn = (k + 1) * (trial % 6 + 1) % 7;
+      q.push_back(k == 5 ? 0.1 : (k * k + trial) % 3 == 0 ? -0.3 : 0.3);
+      v.push_back(k == 5 ? 0 : turn - 3);
+    }
+    simulation.set_positions(q);
+    simulation.set_velocities(v);
+    const double before = simulation.energy().kinetic;
+    run(simulation, 1);
+    reference::PlainScene plain(model, {}, {0, 0, 0});
+    plain.start(Eigen::Map<const Eigen::VectorXd>(q.data(), joints), Eigen::Map<const Eigen::VectorXd>(v.data(), joints));
+    const std::vector<double> after = simulation.velocities();
+    const Eigen::VectorXd change = Eigen::Map<const Eigen::VectorXd>(after.data(), joints) - plain.v;
+    const Eigen::VectorXd impulse = plain.mass_matrix() * change;
+    const double scale = impulse.cwiseAbs().maxCoeff();
+    CAPTURE(trial, impulse.transpose(), plain.v.transpose(), change.transpose());
+    REQUIRE(scale > 1e-3);
+    for (int k = 0; k < joints; ++k) {
+      const auto row = static_cast<std::size_t>(k);
+      if (k == 5) {
+        // neither at a limit; it may be thrown about no faster than its limit of velocity
+        CHECK(std::abs(after[row]) < 0.1 + 1e-9);
+        CHECK((std::abs(impulse[k]) < 1e-4 * scale || impulse[k] * after[row] < 0));
+        continue;
+      }
+      const double out = q[row] > 0 ? -1 : 1;
+      CHECK(out * after[row] > -1e-9);
+      CHECK(out * impulse[k] > -1e-4 * scale);
+      CHECK(std::min(std::abs(after[row]), std::abs(impulse[k]) / scale) < 1e-4);
+    }
+    CHECK(simulation.energy().kinetic + simulation.effect_work().of<JointLimit>() == Approx(before).epsilon(1e-4));
+    CHECK(simulation.effect_work().of<JointLimit>() > 0);
+  }
+}
+
+TEST_CASE("what a blow makes the drive of a given motion give is booked, once", "[blows]") {
+  for (const double e : {0.0, 0.6}) {
+    Effects effects;
+    effects.motions = {{.row = 0, .position = {{0, 1}, {0, 0.5}}}};
+    effects.limits = {{.row = 1, .lower = -10, .upper = 0.2, .restitution = e}};
+    Simulation simulation(links_in_a_row(2), weightless(1e-4), effects);
+    simulation.set_velocities(std::vector<double>{0.5, 1.3});
+    const auto balance = [&] {
+      return simulation.energy().kinetic + simulation.effect_work().taken() - simulation.effect_work().given();
+    };
+    run(simulation, 1000);
+    const double before = balance(), driven = simulation.effect_work().of<JointMotion>();
+    REQUIRE(simulation.effect_work().of<JointLimit>() == 0);
+    run(simulation, 1000);
+    REQUIRE(simulation.effect_work().of<JointLimit>() > 0);
+    CHECK(std::abs(simulation.effect_work().of<JointMotion>() - driven) > 1e-3);
+    CHECK(balance() == Approx(before).margin(1e-5));
   }
 }
 

@@ -140,6 +140,35 @@ TEST_CASE("the plain simulator damps an oscillator as its closed form does", "[p
   CHECK(scene.q[0] == Approx(expected).margin(1e-10));
 }
 
+TEST_CASE("the plain simulator's mass between two springs with play swings and flies as its closed form does, and stops short by friction's work", "[plain]") {
+  const double m = 2, k = 500, w = 0.02, rest = 0.1, A = 0.03, rate = std::sqrt(k / m);
+  Effects effects;
+  effects.dead_zone_springs = {{.row = 0, .stiffness = k, .half_width = w, .rest = rest}};
+  const Model model = one(JointType::prismatic, m, 0.01);
+  const double swing = 0.5 * std::numbers::pi / rate, flight = 2 * w / (A * rate);
+  PlainScene scene(model, effects, kNone);
+  scene.start(numbers({rest + w + A}), numbers({0}));
+  CHECK(scene.stiffest_rate() == Approx(rate));
+  CHECK(scene.energy() == Approx(0.5 * k * A * A));
+  scene.advance(swing + 0.25 * flight, 4000);
+  CHECK(scene.q[0] == Approx(rest + 0.5 * w).margin(1e-8));
+  CHECK(scene.v[0] == Approx(-A * rate).epsilon(1e-6));
+  scene.advance(0.75 * flight + 0.5 * swing, 4000);
+  CHECK(scene.q[0] == Approx(rest - w - A * std::sqrt(0.5)).margin(1e-8));
+  CHECK(scene.energy() == Approx(0.5 * k * A * A).epsilon(1e-6));
+  // k/2 (A^2 - B^2) = f (A + B + 2 w)
+  const double f = 2, s = f / k, B = -s + std::sqrt((A - s) * (A - s) - 4 * s * w);
+  effects.friction = {{.row = 0, .force = f}};
+  PlainScene slowed(model, effects, kNone);
+  slowed.start(numbers({rest + w + A}), numbers({0}));
+  double lowest = slowed.q[0];
+  for (int step = 0; step < 400; ++step) {
+    slowed.advance(1e-3, 64);
+    lowest = std::min(lowest, slowed.q[0]);
+  }
+  CHECK(lowest == Approx(rest - w - B).margin(2e-5));
+}
+
 TEST_CASE("the plain simulator's servo sags by the load over its stiffness, and gives way where its force is limited", "[plain]") {
   // a slider along z under its weight
   Effects effects;

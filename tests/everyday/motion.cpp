@@ -242,6 +242,10 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
     for (const JointFriction& friction : scene.effects.friction) {
       sum += 0.5 * std::pow(h * friction.force, 2) / inertia[friction.row];
     }
+    for (const DeadZoneSpring& spring : scene.effects.dead_zone_springs) {
+      // of an edge that is crossed within a step
+      sum += spring.stiffness * std::pow(h * node.v[spring.row], 2) / 8;
+    }
     if (scene.effects.ground) {
       const double push = scene.effects.ground->stiffness;
       const auto motions = reference::body_motions(plain.tree(), plain.q, plain.v);

@@ -235,6 +235,7 @@ class Maker {
     if (wants(0.08, kind_ == torque)) make_torques();
     if (wants(0.08, kind_ == drag)) make_drag();
     if (scene_.number % 5 == 2) make_motion();
+    if (scene_.number % 7 == 5) make_dead_zones();
     if (on_ground()) make_ground();
   }
 
@@ -266,6 +267,22 @@ class Maker {
     std::erase_if(scene_.effects.friction, of_it);
     std::erase_if(scene_.effects.limits, of_it);
     scene_.bends = true;
+  }
+
+  /// Joints with play, between springs: they start within their zones or beyond. Numbers of its own, as above.
+  void make_dead_zones() {
+    Random random(scene_.seed * 15485863 + scene_.number);
+    const auto log_uniform = [&](double low, double high) { return std::exp(random.uniform(std::log(low), std::log(high))); };
+    each_screw([&](Index slot, Index row) {
+      const double w = std::min(log_uniform(0.005, scene_.stiff ? 4 : 0.3) / h_, scene_.stiff ? 1e4 : 500);
+      const double size = slides(slot) ? 0.1 : 0.8, beyond = std::min(size, (slides(slot) ? 1.0 : 5.0) / w);
+      const double half_width = size * log_uniform(0.01, 1), away = random.uniform(-1, 1) * (half_width + beyond);
+      const bool moved = std::ranges::any_of(scene_.effects.motions, [&](const JointMotion& motion) { return motion.row == row; });
+      if (moved || random.uniform(0, 1) < 0.3) return;
+      scene_.effects.dead_zone_springs.push_back(
+          {.row = row, .stiffness = inertia(row) * w * w, .half_width = half_width, .rest = position_of(slot) - away});
+    });
+    scene_.bends = scene_.bends || !scene_.effects.dead_zone_springs.empty();
   }
 
   void make_servos() {
@@ -462,6 +479,7 @@ std::string EverydayScene::text() const {
   name(options.gravity != std::array<double, 3>{0, 0, 0}, "gravity");
   name(!effects.armature.empty(), "armature");
   name(!effects.springs.empty() || !effects.ball_springs.empty(), "springs");
+  name(!effects.dead_zone_springs.empty(), "dead zones");
   name(!effects.damping.empty(), "damping");
   name(!effects.servos.empty(), "servos");
   name(!effects.friction.empty(), "friction");

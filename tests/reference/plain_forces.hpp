@@ -2,7 +2,7 @@
 // What the effects of a scene do at one instant, written down as their laws stand in layout/effects.hpp: forces that are numbers, and
 // rows of what is sudden, whose force follows from how the motion goes on.
 //
-//   force   Q(q, v, t) [nv]                             gravity, springs, damping, torques, wrenches, drag, servos
+//   force   Q(q, v, t) [nv]                             gravity, springs, dead zones, damping, torques, wrenches, drag, servos
 //   row     J v + compliance lambda = goal,  lambda within [low, high], or at an end of it and pushing on
 //
 //   friction    J one joint               goal 0                      |lambda| <= f dt
@@ -113,12 +113,15 @@ class PlainForces {
     return Q;
   }
 
-  /// Slopes of the joints' forces along their own rows: -dQ/dv, -dQ/dq.
-  void joint_gains(VectorXd& c, VectorXd& k) const {
+  /// Slopes of the joints' forces along their own rows: -dQ/dv, -dQ/dq, the latter at q.
+  void joint_gains(const VectorXd& q, VectorXd& c, VectorXd& k) const {
     c = k = VectorXd::Zero(tree_->velocities);
     for (const JointSpring& spring : effects_->springs) k[spring.row] += spring.stiffness;
     for (const BallSpring& spring : effects_->ball_springs) {
       k.segment<3>(tree_->body(spring.slot).v).array() += spring.stiffness;
+    }
+    for (const DeadZoneSpring& spring : effects_->dead_zone_springs) {
+      if (std::abs(position(q, spring.row) - spring.rest) > spring.half_width) k[spring.row] += spring.stiffness;
     }
     for (const JointDamping& damper : effects_->damping) c[damper.row] += damper.coefficient;
     for (const Servo& servo : effects_->servos) {

@@ -79,10 +79,13 @@ class PlainScene {
     return (fixed_->Z * M.ldlt().solve(fixed_->Z.transpose())).diagonal().cwiseInverse();
   }
 
-  /// Stiffest of the joints' own rates [1/s]: roots of stiffness, and damping, over inertia.
+  /// Stiffest of the joints' own rates [1/s], those beyond dead zones too: roots of stiffness, and damping, over inertia.
   double stiffest_rate() const {
     VectorXd c, k;
-    fixed_->forces.joint_gains(c, k);
+    fixed_->forces.joint_gains(q, c, k);
+    for (const DeadZoneSpring& spring : fixed_->effects.dead_zone_springs) {
+      if (std::abs(fixed_->forces.position(q, spring.row) - spring.rest) <= spring.half_width) k[spring.row] += spring.stiffness;
+    }
     for (const Servo& servo : fixed_->effects.servos) {
       if (!std::isfinite(servo.max_force)) continue;
       c[servo.row] += servo.damping;
@@ -252,7 +255,7 @@ class PlainScene {
     const MatrixXd& Z = fixed_->Z;
     const std::vector<BodyMotion> motions = body_motions(tree(), q, v, true);
     VectorXd c, k;
-    fixed_->forces.joint_gains(c, k);
+    fixed_->forces.joint_gains(q, c, k);
     MatrixXd M = mass_matrix_at(motions);
     M.diagonal() += dt * c + dt * dt * k;
     const Eigen::LLT<MatrixXd> A(Z.transpose() * M * Z);
