@@ -219,13 +219,15 @@ struct BatchOf<Real>::Data {
     const auto width = static_cast<std::size_t>(observations.width());
     for_blocks([&](std::int64_t b, Worker& mine) {
       if (!mine.observer || mine.observer->schedule() != observations.schedule().get()) {
-        mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), BlockSetup<Real>{*model, constants, options, plan}, instructions);
+        const BlockSetup<Real> setup{*model, constants, options, plan};
+        mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), setup, instructions);
       }
       const Block<Real> here = block(b);
       const std::span<const Real> rows = mine.observer->observe(here, *mine.block);
+      const auto stride = static_cast<std::size_t>(lanes);
       for (int l = 0; l < here.count; ++l) {
         Number* const row = to.data() + static_cast<std::size_t>(b * lanes + l) * width;
-        for (std::size_t k = 0; k < width; ++k) row[k] = static_cast<Number>(rows[k * static_cast<std::size_t>(lanes) + static_cast<std::size_t>(l)]);
+        for (std::size_t k = 0; k < width; ++k) row[k] = static_cast<Number>(rows[k * stride + static_cast<std::size_t>(l)]);
       }
     });
   }

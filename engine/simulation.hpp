@@ -76,8 +76,8 @@ class Simulation {
   std::span<const double> momenta() const { return state_.p.flat(); }
   /// Velocities of the motion: one O(n) solve (engine/VELOCITY.md).
   std::vector<double> velocities();
-  /// Accelerations of the motion [nv]: what the mean velocities of the last two steps differ by, over the step, which is how fast they change
-  /// at the node between the two. Zero where less than two steps are known: after a start, a change of the state, a blow at a limit or a
+  /// Accelerations of the motion [nv]: what the mean velocities of the last two steps differ by, over the step, which is how fast they
+  /// change at the node between the two. Zero where less than two steps are known: after a start, a change of the state, a blow at a limit or a
   /// step that was split. Throws InputError for an order above 2, whose sub-steps differ in length.
   std::vector<double> accelerations() const;
 

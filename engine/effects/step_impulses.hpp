@@ -12,8 +12,8 @@ namespace linden {
 struct StepImpulses {
   std::vector<double> joints;         // [nv; N m s, N s] of all effects, conjugate to the velocities
   std::vector<double> servos;         // of each, in the order of Effects::servos
-  std::vector<double> bodies;         // [slots x 6; N m s, N s] of all effects on each body: moment about its origin, force; in its frame at the
-                                      // beginning of the part
+  std::vector<double> bodies;         // [slots x 6; N m s, N s] of all effects on each body: moment about its origin, force; in its frame
+                                      // at the beginning of the part
   std::vector<double> ground;         // of each contact point, along the normal [N s]
   std::vector<double> pushes;         // [points x 3; N s] of each contact point, friction with it; world frame
   std::vector<double> normals;        // [points x 3] of the ground there, world frame; where the part taken last ended

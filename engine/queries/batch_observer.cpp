@@ -8,10 +8,13 @@
 namespace linden {
 
 template <class Real>
-BatchObserver<Real>::BatchObserver(std::shared_ptr<const ObservationSchedule> schedule, const BlockSetup<Real>& setup, Instructions instructions)
-    : schedule_(std::move(schedule)), setup_(setup), lanes_(lanes_of<Real>(instructions)),
-      observer_(make_block_observer(instructions,
-                                    ObserverSetup<Real>{setup.model.tree, setup.constants, *schedule_, setup.options.gravity})) {
+BatchObserver<Real>::BatchObserver(std::shared_ptr<const ObservationSchedule> schedule, const BlockSetup<Real>& setup,
+                                   Instructions instructions)
+    : schedule_(std::move(schedule)),
+      setup_(setup),
+      lanes_(lanes_of<Real>(instructions)),
+      observer_(
+          make_block_observer(instructions, ObserverSetup<Real>{setup.model.tree, setup.constants, *schedule_, setup.options.gravity})) {
   const auto room = [&](bool asked, Index rows) { return asked ? static_cast<std::size_t>(rows * lanes_) : 0; };
   const Index nv = setup.model.tree.shape.velocities;
   const bool reads = schedule_->velocities || schedule_->energy;  // the two are found together
@@ -40,7 +43,8 @@ void BatchObserver<Real>::read_targets(const Block<Real>& block) {
   for (std::size_t k = 0; k < targets_.size(); ++k) {
     const Servo& servo = setup_.plan.effects.servos[k / static_cast<std::size_t>(lanes_)];
     const Real given = block.targets != nullptr ? block.targets[k] : static_cast<Real>(std::nan(""));
-    targets_[k] = std::isnan(given) ? static_cast<Real>(servo.target_at(static_cast<double>(time_[k % static_cast<std::size_t>(lanes_)]))) : given;
+    targets_[k] =
+        std::isnan(given) ? static_cast<Real>(servo.target_at(static_cast<double>(time_[k % static_cast<std::size_t>(lanes_)]))) : given;
   }
 }
 
@@ -52,7 +56,12 @@ std::span<const Real> BatchObserver<Real>::observe(const Block<Real>& block, Blo
   if (!v_.empty()) stepper.observe(block, v_.data(), energy_.data());
   if (schedule_->accelerations) read_accelerations(block);
   if (schedule_->targets) read_targets(block);
-  observer_->observe({.q = block.q, .v = v_.data(), .a = a_.data(), .targets = targets_.data(), .time = time_.data(), .energy = energy_.data(),
+  observer_->observe({.q = block.q,
+                      .v = v_.data(),
+                      .a = a_.data(),
+                      .targets = targets_.data(),
+                      .time = time_.data(),
+                      .energy = energy_.data(),
                       .mass = block.mass},
                      rows_.data());
   return rows_;

@@ -14,7 +14,8 @@ void require_same_model(const ObservationSchedule& schedule, const Model& model)
 
 void require_same_servos(const ObservationSchedule& schedule, std::size_t servos) {
   if (servos == schedule.servos) return;
-  throw InputError(fmt::format("observations made for {} servos were asked of {}; expected those made for the same effects", schedule.servos, servos));
+  throw InputError(
+      fmt::format("observations made for {} servos were asked of {}; expected those made for the same effects", schedule.servos, servos));
 }
 
 template <class Real>

@@ -10,7 +10,9 @@ TotalMomentum<double> total(const Kinematics& state) {
   return total_momentum_map<true>(state.model().tree, state.model().constants, state.bodies());
 }
 
-Vec3<double> per_mass(const TotalMomentum<double>& sum, const Vec3<double>& a) { return sum.mass > 0 ? a / sum.mass : Vec3<double>{0, 0, 0}; }
+Vec3<double> per_mass(const TotalMomentum<double>& sum, const Vec3<double>& a) {
+  return sum.mass > 0 ? a / sum.mass : Vec3<double>{0, 0, 0};
+}
 
 }  // namespace
 

@@ -14,8 +14,8 @@ struct EnergyShare {
   double energy = 0;  // [J]
 };
 
-/// Energies that there are in the scene, and what each of its effects took or gave since the start, in this order. The sum of the first kind,
-/// plus what was taken, less what was given, stays.
+/// Energies that there are in the scene, and what each of its effects took or gave since the start, in this order. The sum of the first
+/// kind, plus what was taken, less what was given, stays.
 std::vector<EnergyShare> energy_by_effect(Simulation& simulation);
 
 }  // namespace linden

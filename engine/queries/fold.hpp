@@ -1,6 +1,6 @@
 // engine/queries/fold.hpp
-// Mimic joints in what questions answer: shares of followers are carried to their leaders (kernels/tree/mimic.hpp). For the code of questions
-// alone.
+// Mimic joints in what questions answer: shares of followers are carried to their leaders (kernels/tree/mimic.hpp). For the code of
+// questions alone.
 #pragma once
 
 #include "engine/queries/matrix.hpp"

@@ -24,10 +24,13 @@ void put(const char* what, std::span<const double> given, const Model& model, co
     return;
   }
   if (given.size() != rows.size()) {
-    throw InputError(fmt::format("{}: {} numbers given for model {}, expected {}", what, given.size(), quoted(model.names.model), rows.size()));
+    throw InputError(
+        fmt::format("{}: {} numbers given for model {}, expected {}", what, given.size(), quoted(model.names.model), rows.size()));
   }
   for (std::size_t k = 0; k < given.size(); ++k) {
-    if (!std::isfinite(given[k])) throw InputError(fmt::format("{}: that of {} is {}; expected a finite number", what, quoted(names[k]), given[k]));
+    if (!std::isfinite(given[k])) {
+      throw InputError(fmt::format("{}: that of {} is {}; expected a finite number", what, quoted(names[k]), given[k]));
+    }
   }
   std::ranges::copy(given, rows.begin());
 }
@@ -65,7 +68,9 @@ Kinematics& Kinematics::operator=(const Kinematics& other) { return *this = Kine
 
 void Kinematics::set(std::span<const double> q, std::span<const double> v, std::span<const double> a) {
   const Names& names = model_->names;
-  if (q.empty() && q_.rows() > 0) throw InputError(fmt::format("positions: none given for model {}, expected {}", quoted(names.model), q_.rows()));
+  if (q.empty() && q_.rows() > 0) {
+    throw InputError(fmt::format("positions: none given for model {}, expected {}", quoted(names.model), q_.rows()));
+  }
   put("positions", q, *model_, names.position, q_);
   put("velocities", v, *model_, names.velocity, v_);
   put("accelerations", a, *model_, names.velocity, a_);

@@ -1,4 +1,5 @@
-// Compiled for each set of instructions; CMakeLists.txt says which: LINDEN_INSTRUCTIONS names the set, LINDEN_PACK its register of Real numbers.
+// Compiled for each set of instructions; CMakeLists.txt says which: LINDEN_INSTRUCTIONS names the set, LINDEN_PACK its register of Real
+// numbers.
 #include "engine/queries/lane_observer.hpp"
 
 #include <xsimd/xsimd.hpp>

@@ -1,5 +1,6 @@
 // engine/queries/lane_observer.hpp
-// Observations of a block of W states: lane = state. Bodies are followed down the tree as far as the schedule says, then each entry is read off.
+// Observations of a block of W states: lane = state. Bodies are followed down the tree as far as the schedule says, then each entry is read
+// off.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // engine/queries/link_motion.hpp
-// Where a link is, how it moves and how it accelerates. Any link of the robot's file, by place_of(model, name) (layout/effects.hpp): one that
-// was merged into another body while reading has kept its place in it.
+// Where a link is, how it moves and how it accelerates. Any link of the robot's file, by place_of(model, name) (layout/effects.hpp): one
+// that was merged into another body while reading has kept its place in it.
 #pragma once
 
 #include "engine/queries/kinematics.hpp"
@@ -13,8 +13,8 @@ Pose link_pose(const Kinematics& state, const LinkPlace& link);
 /// Angular and linear velocity: of the link's origin in the directions of the world, unless another frame is asked for.
 SpatialMotion link_twist(const Kinematics& state, const LinkPlace& link, Frame frame = Frame::aligned);
 
-/// Angular acceleration, and that of the link's origin: the second derivative of its position, in the directions of the world (aligned) or of
-/// the link. Frame::world is refused with InputError: there is no place of the link there to follow.
+/// Angular acceleration, and that of the link's origin: the second derivative of its position, in the directions of the world (aligned) or
+/// of the link. Frame::world is refused with InputError: there is no place of the link there to follow.
 SpatialMotion link_acceleration(const Kinematics& state, const LinkPlace& link, Frame frame = Frame::aligned);
 
 /// Spatial acceleration: the derivative of the twist as that frame sees it while it stands still. Of the link's origin it is less than the

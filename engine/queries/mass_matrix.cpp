@@ -77,7 +77,9 @@ Matrix mass_matrix(const Kinematics& state) {
   composite.allocate(model.tree.shape.slots);
   Matrix M(nv, nv);
   mass_matrix_up(model.tree, model.constants, state.bodies().placement, composite, M.numbers.data());
-  for (Index row = 0; row < static_cast<Index>(state.armature().size()); ++row) M(row, row) += state.armature()[static_cast<std::size_t>(row)];
+  for (Index row = 0; row < static_cast<Index>(state.armature().size()); ++row) {
+    M(row, row) += state.armature()[static_cast<std::size_t>(row)];
+  }
   fold_columns(model, M);
   fold_rows(model, M);
   return M;
@@ -95,7 +97,8 @@ std::vector<double> solve_mass_matrix(const Kinematics& state, std::span<const d
 std::vector<double> forward_dynamics(const Kinematics& state, std::span<const double> tau) {
   std::vector<double> f = bias_forces(state);
   if (tau.size() != f.size()) {
-    throw InputError(fmt::format("joint forces: {} numbers given for model {}, expected {}", tau.size(), quoted(state.model().names.model), f.size()));
+    throw InputError(
+        fmt::format("joint forces: {} numbers given for model {}, expected {}", tau.size(), quoted(state.model().names.model), f.size()));
   }
   for (std::size_t k = 0; k < f.size(); ++k) f[k] = tau[k] - f[k];
   return MassSolve(state).solve(f);

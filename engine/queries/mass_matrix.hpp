@@ -16,7 +16,8 @@ Matrix mass_matrix(const Kinematics& state);
 /// carried to their leaders. cost  O(n), without the matrix. Throws InputError for another count.
 std::vector<double> solve_mass_matrix(const Kinematics& state, std::span<const double> f);
 
-/// Accelerations that joint forces tau [nv] give the state, gravity and what turns of itself with them: M^-1 (tau - bias_forces). cost  O(n).
+/// Accelerations that joint forces tau [nv] give the state, gravity and what turns of itself with them: M^-1 (tau - bias_forces).
+/// cost  O(n).
 std::vector<double> forward_dynamics(const Kinematics& state, std::span<const double> tau);
 
 }  // namespace linden

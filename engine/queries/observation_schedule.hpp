@@ -1,6 +1,6 @@
 // engine/queries/observation_schedule.hpp
-// What a list of observations comes to: which bodies have to be followed how far, and what is then looked at, in order. Plain data, the same for
-// one state and for blocks of them; the lanes that go by it are in engine/queries/lane_observer.hpp.
+// What a list of observations comes to: which bodies have to be followed how far, and what is then looked at, in order. Plain data, the
+// same for one state and for blocks of them; the lanes that go by it are in engine/queries/lane_observer.hpp.
 #pragma once
 
 #include <cstdint>

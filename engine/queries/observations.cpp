@@ -59,12 +59,15 @@ const Kind& kind_of(const std::string& name, std::string_view word, bool has_sub
   if (found == kKinds.end()) {
     const std::vector<std::string> known = kind_names();
     const std::string guess = nearest(word, known);
-    throw InputError(fmt::format("observation {} is not known; expected one of {}, of a joint or link with its name behind a colon{}", quoted(name),
-                                 fmt::join(known, ", "), guess.empty() ? "" : fmt::format("; did you mean {}?", guess)));
+    throw InputError(fmt::format("observation {} is not known; expected one of {}, of a joint or link with its name behind a colon{}",
+                                 quoted(name), fmt::join(known, ", "), guess.empty() ? "" : fmt::format("; did you mean {}?", guess)));
   }
-  if (has_subject && found->subject == none) throw InputError(fmt::format("observation {}: {} is of the whole state; expected no name behind it", quoted(name), word));
+  if (has_subject && found->subject == none) {
+    throw InputError(fmt::format("observation {}: {} is of the whole state; expected no name behind it", quoted(name), word));
+  }
   if (!has_subject && (found->subject == joint || found->subject == link)) {
-    throw InputError(fmt::format("observation {}: of which {}? expected \"{}:NAME\"", quoted(name), found->subject == joint ? "joint" : "link", word));
+    throw InputError(
+        fmt::format("observation {}: of which {}? expected \"{}:NAME\"", quoted(name), found->subject == joint ? "joint" : "link", word));
   }
   return *found;
 }
@@ -124,7 +127,9 @@ class Compiler {
   void choose_rows(ScheduledLook& look, const std::string& joint, Observed& entry) {
     const Names& names = model_.names;
     if (look.what == Look::targets) {
-      for (std::size_t k = 0; k < effects_.servos.size(); ++k) entry.rows.push_back(names.velocity[static_cast<std::size_t>(effects_.servos[k].row)]);
+      for (std::size_t k = 0; k < effects_.servos.size(); ++k) {
+        entry.rows.push_back(names.velocity[static_cast<std::size_t>(effects_.servos[k].row)]);
+      }
       look.count = static_cast<Index>(entry.rows.size());
       if (look.count == 0) throw InputError("there is no servo; expected one among the effects");
       if (joint.empty()) return;
@@ -178,7 +183,9 @@ class Compiler {
       case Look::position:
       case Look::quaternion: at_least(MotionDepth::poses); break;
       case Look::contact:
-        if (!effects_.ground) throw InputError(fmt::format("observation {}: there is no ground; expected one among the effects", quoted(name)));
+        if (!effects_.ground) {
+          throw InputError(fmt::format("observation {}: there is no ground; expected one among the effects", quoted(name)));
+        }
         at_least(MotionDepth::twists);
         break;
       case Look::twist: at_least(MotionDepth::twists); break;
@@ -190,7 +197,8 @@ class Compiler {
   /// The ground's points on the bodies that are asked for.
   void keep_ground() {
     const auto asked = [&](Index slot) {
-      return std::ranges::any_of(schedule_.looks, [&](const ScheduledLook& look) { return look.what == Look::contact && look.link.slot == slot; });
+      return std::ranges::any_of(schedule_.looks,
+                                 [&](const ScheduledLook& look) { return look.what == Look::contact && look.link.slot == slot; });
     };
     if (std::ranges::find(schedule_.looks, Look::contact, &ScheduledLook::what) == schedule_.looks.end()) return;
     Effects alone;

@@ -1,14 +1,14 @@
 // engine/queries/observations.hpp
 // A list of what is to be seen of a state, by name, made ready once and then read as often as wanted, one row of numbers a state: of a
-// Simulation, or of all instances of a Batch, in lanes and on all threads, into memory of the caller. Only what is asked for is computed, of
-// bodies only those asked for and those between them and the root.
+// Simulation, or of all instances of a Batch, in lanes and on all threads, into memory of the caller. Only what is asked for is computed,
+// of bodies only those asked for and those between them and the root.
 //
 //   Observations seen(scene.model, scene.effects, {"q", "v", "pose:pelvis", "contact:left_foot"});
 //   std::vector<double> row(seen.width());
 //   seen.observe(simulation, row);
 //   std::vector<float> rows(batch.size() * seen.width());
 //   batch.observe(seen, rows);                                           [size x width]
-//   seen.layout()[2]                                                     pose:pelvis, at which offset, how wide, units, names of its numbers
+//   seen.layout()[2]                                                     pose:pelvis: offset, width, units, names of its numbers
 //
 //   name                  width   numbers
 //   q, v, a               nq, nv  positions, velocities (engine/VELOCITY.md), accelerations (Simulation::accelerations) of all joints
@@ -24,8 +24,8 @@
 //   twist:L               6       angular and linear velocity of its origin, in the world's directions
 //   acceleration:L        6       the same of acceleration
 //   imu:L                 6       angular velocity and specific force, in the link's frame (engine/queries/imu.hpp)
-//   contact:L             2       of the body that holds L: contact points in the ground; normal force of all of them [N], which the law of the
-//                                 ground gives where the body is and as fast as it is (Simulation::contacts has the mean over a step)
+//   contact:L             2       of the body that holds L: contact points in the ground; normal force of all of them [N], which the law of
+//                                 the ground gives where the body is and as fast as it is (Simulation::contacts has the mean over a step)
 //
 // Numbers of a Batch equal those of a Simulation in the same state to rounding.
 #pragma once

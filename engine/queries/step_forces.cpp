@@ -43,9 +43,10 @@ StepMomenta momenta(const Kinematics& from, const Kinematics& to) {
   const Field<double, 12>& placement = from.bodies().placement;
   motion_between_map(tree, model.constants, field_of(from.positions()), field_of(to.positions()), motion);
   if (!(displacement_down(tree, placement, motion, step.displacement) > 0)) {
-    throw InputError(fmt::format("forces of a step of model {}: a body turns by half a turn or more in it; expected configurations that lie "
-                                 "closer together",
-                                 quoted(model.names.model)));
+    throw InputError(
+        fmt::format("forces of a step of model {}: a body turns by half a turn or more in it; expected configurations that lie "
+                    "closer together",
+                    quoted(model.names.model)));
   }
   momentum_map(tree, model.constants, step.displacement, step.momentum);
   impulse_up(tree, model.constants, placement, step.momentum, projected);

@@ -72,7 +72,8 @@ void put_products(const Tree& tree, const BodyConstants<Element>& constants, Ind
 
 /// C of every body.
 template <class S, class Element>
-void composite_inertia_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, Field<S, 10>& composite) {
+void composite_inertia_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
+                          Field<S, 10>& composite) {
   for (Index i = 0; i < tree.shape.slots; ++i) store(composite, i, load<Inertia, S>(constants.inertia, i));
   for (Index i = tree.shape.slots - 1; i > 0; --i) {
     const Index parent = tree.parent(i);

@@ -150,7 +150,9 @@ TEST_CASE("a joint between two bodies that stand carries the upper one", "[conta
   Vector3d in_world;
   for (int row = 0; row < 3; ++row) {
     in_world[row] = 0;
-    for (int column = 0; column < 3; ++column) in_world[row] += body.rotation[static_cast<std::size_t>(3 * row + column)] * force[static_cast<std::size_t>(column)];
+    for (int column = 0; column < 3; ++column) {
+      in_world[row] += body.rotation[static_cast<std::size_t>(3 * row + column)] * force[static_cast<std::size_t>(column)];
+    }
   }
   CHECK((in_world - Vector3d(0, 0, 3 * 9.81)).norm() < 1e-5);
   CHECK(eigen(reactions[1].force).norm() < 1e-5);

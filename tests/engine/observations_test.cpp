@@ -48,7 +48,9 @@ struct Stage {
 std::vector<std::string> everything(const Stage& stage) {
   std::vector<std::string> names{"q", "v", "a", "targets", "time", "energy", "com", "com_velocity", "momentum"};
   for (const std::string& link : stage.links()) {
-    for (const char* kind : {"pose", "position", "quaternion", "twist", "acceleration", "imu", "contact"}) names.push_back(fmt::format("{}:{}", kind, link));
+    for (const char* kind : {"pose", "position", "quaternion", "twist", "acceleration", "imu", "contact"}) {
+      names.push_back(fmt::format("{}:{}", kind, link));
+    }
   }
   return names;
 }
@@ -60,7 +62,9 @@ void expect(const Observations& seen, const Numbers& row, const std::string& nam
   REQUIRE(entry.rows.size() == expected.size());
   double scale = 1;
   for (const double number : expected) scale = std::max(scale, std::abs(number));
-  for (std::size_t k = 0; k < expected.size(); ++k) CHECK(std::abs(row[static_cast<std::size_t>(entry.offset) + k] - expected[k]) <= tolerance * scale);
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    CHECK(std::abs(row[static_cast<std::size_t>(entry.offset) + k] - expected[k]) <= tolerance * scale);
+  }
 }
 
 Numbers joined(std::span<const double> a, std::span<const double> b) {
@@ -126,7 +130,8 @@ TEST_CASE("what is observed of a joint are its rows", "[observations]") {
     seen.observe(simulation, row);
     for (Index k = 0; k < seen.layout()[0].width; ++k) {
       CHECK(row[static_cast<std::size_t>(k)] == simulation.positions()[static_cast<std::size_t>(tree.first_q(i) + k)]);
-      CHECK(seen.layout()[0].rows[static_cast<std::size_t>(k)] == stage.model.names.position[static_cast<std::size_t>(tree.first_q(i) + k)]);
+      CHECK(seen.layout()[0].rows[static_cast<std::size_t>(k)] ==
+            stage.model.names.position[static_cast<std::size_t>(tree.first_q(i) + k)]);
     }
     CHECK(row[static_cast<std::size_t>(seen.layout()[1].offset)] == simulation.velocities()[static_cast<std::size_t>(tree.first_v(i))]);
     const auto servo = std::ranges::find(stage.effects.servos, tree.first_v(i), &Servo::row);
@@ -182,7 +187,9 @@ TEST_CASE("a batch sees what simulations see, with any instructions and any numb
       Numbers rows(static_cast<std::size_t>(size) * width, NAN);
       batch.observe(seen, rows);
       if (instructions == Instructions::scalar && threads == 1) first = rows;
-      if (instructions == Instructions::scalar) CHECK(std::ranges::equal(rows, first, {}, std::bit_cast<std::uint64_t, double>, std::bit_cast<std::uint64_t, double>));
+      if (instructions == Instructions::scalar) {
+        CHECK(std::ranges::equal(rows, first, {}, std::bit_cast<std::uint64_t, double>, std::bit_cast<std::uint64_t, double>));
+      }
       CHECK(rows[4 * width + static_cast<std::size_t>(seen.at("targets").offset) + 2] == 0.25);
       CHECK(rows[3 * width + static_cast<std::size_t>(seen.at("targets").offset) + 2] == 0);
       std::vector<float> short_rows(rows.size());
@@ -208,7 +215,8 @@ TEST_CASE("a batch sees what simulations see, with any instructions and any numb
         expect(seen, row, "com", Numbers(centre.position.begin(), centre.position.end()));
         expect(seen, row, "com_velocity", Numbers(centre.velocity.begin(), centre.velocity.end()));
         expect(seen, row, "time", {0.06});
-        // and is that of a simulation from the same start, to the solver's tolerance; accelerations to the eleven bits that are kept of them
+        // and is that of a simulation from the same start, to the solver's tolerance; accelerations to the eleven bits that are kept of
+        // them
         Simulation simulation(stage.model, stage.options, stage.effects);
         simulation.set_positions(start(i).positions);
         simulation.set_velocities(start(i).velocities);
@@ -219,9 +227,11 @@ TEST_CASE("a batch sees what simulations see, with any instructions and any numb
         Numbers alone(width);
         seen.observe(simulation, alone);
         for (const char* name : {"q", "v", "energy", "momentum"}) {
-          expect(seen, row, name, Numbers(alone.begin() + seen.at(name).offset, alone.begin() + seen.at(name).offset + seen.at(name).width), 1e-6);
+          expect(seen, row, name, Numbers(alone.begin() + seen.at(name).offset, alone.begin() + seen.at(name).offset + seen.at(name).width),
+                 1e-6);
         }
-        expect(seen, row, "a", Numbers(alone.begin() + seen.at("a").offset, alone.begin() + seen.at("a").offset + seen.at("a").width), 1e-3);
+        expect(seen, row, "a", Numbers(alone.begin() + seen.at("a").offset, alone.begin() + seen.at("a").offset + seen.at("a").width),
+               1e-3);
       }
     }
   }

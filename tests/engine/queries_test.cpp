@@ -110,7 +110,8 @@ TEST_CASE("every link is where the plain tree has it, moves by its Jacobian and 
     const Asked soon = later(model, at, kTime), before = later(model, at, -kTime);
     const Kinematics next(model, soon.q, soon.v), last(model, before.q, before.v);
     for (const auto& [name, link] : model.names.link) {
-      const reference::Matrix4<double> expected = poses[static_cast<std::size_t>(link.slot)] * eigen(link.in_body), T = eigen(link_pose(state, link));
+      const reference::Matrix4<double> expected = poses[static_cast<std::size_t>(link.slot)] * eigen(link.in_body),
+                                       T = eigen(link_pose(state, link));
       worst = std::max(worst, relative(T, expected));
       merged += link.in_body == Pose{} ? 0 : 1;
       const auto J = reference::body_jacobian<double>(tree, poses, link.slot);
@@ -241,7 +242,9 @@ TEST_CASE("mass matrix and inverse, bias forces and inverse dynamics are those o
     Numbers rotors;
     Random random(1);
     for (Index i = 1; i < tree.slots(); ++i) {
-      for (Index k = 0; k < tree.body(i).dofs(); ++k) rotors.push_back(tree.body(i).kind == JointKind::free ? 0.0 : random.uniform(0.01, 0.1));
+      for (Index k = 0; k < tree.body(i).dofs(); ++k) {
+        rotors.push_back(tree.body(i).kind == JointKind::free ? 0.0 : random.uniform(0.01, 0.1));
+      }
     }
     state.set_armature(rotors);
     M.diagonal() += eigen(std::span(rotors));
@@ -336,7 +339,9 @@ TEST_CASE("joint reactions carry what hangs below, and what swings pulls outward
   // the shoulder turns at 2 rad/s: m w^2 r of both masses, 1 m and 2 m away
   state.set(Numbers{0, 0}, Numbers{2, 0});
   reactions = joint_reactions(state);
-  CHECK((world(state, "upper", reactions[static_cast<std::size_t>(shoulder)].force) - Vector3d(0, 0, 5 * 9.81 + 4 * (2 * 1 + 3 * 2))).norm() < 1e-12);
+  CHECK(
+      (world(state, "upper", reactions[static_cast<std::size_t>(shoulder)].force) - Vector3d(0, 0, 5 * 9.81 + 4 * (2 * 1 + 3 * 2))).norm() <
+      1e-12);
   CHECK((world(state, "lower", reactions[static_cast<std::size_t>(elbow)].force) - Vector3d(0, 0, 3 * 9.81 + 4 * 3 * 2)).norm() < 1e-12);
   // the same from three configurations of a turn that goes on evenly: chords are shorter than arcs by a 24th of the square of the angle
   constexpr double kStep = 1e-3;

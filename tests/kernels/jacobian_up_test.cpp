@@ -29,7 +29,8 @@ TEST_CASE("Jacobians of bodies in any frame are the plain tree's, seen from ther
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       const RowMajor J = Eigen::Map<const RowMajor>(rig.jacobian.row(0), 6, tree.velocities);
       const reference::Matrix4<double> relative = reference::inverse<double>(eigen(frame)) * poses[static_cast<std::size_t>(i)];
-      see(worst, relative_error(MatrixXd(J), MatrixXd(reference::adjoint<double>(relative) * reference::body_jacobian<double>(tree, poses, i))));
+      see(worst,
+          relative_error(MatrixXd(J), MatrixXd(reference::adjoint<double>(relative) * reference::body_jacobian<double>(tree, poses, i))));
     }
   }
   INFO("worst relative error: " << worst);

@@ -1,6 +1,6 @@
 // tests/kernels/query_rig.hpp
-// What the kernels of questions need, for any Scalar, with random states of a tree; and the proofs that each of them owes: every number that it
-// is to write is written and nothing else, nothing is allocated, lanes are alike in any company and close to the plain path.
+// What the kernels of questions need, for any Scalar, with random states of a tree; and the proofs that each of them owes: every number
+// that it is to write is written and nothing else, nothing is allocated, lanes are alike in any company and close to the plain path.
 //
 //   const auto kernel = [](auto& rig) { total_momentum_map<true>(rig.tree, rig.constants, rig.motions); };
 //   check_query(prepare, kernel, {"momentum"});
@@ -96,14 +96,16 @@ struct QueryRig {
 
 /// Before most kernels: where bodies are, how they move and accelerate.
 inline constexpr auto follow_bodies = [](auto& rig) {
-  body_motion_down<MotionDepth::accelerations>(rig.tree, rig.constants, rig.slots.data(), rig.slots.size(), rig.q, rig.v, rig.a, rig.motions);
+  body_motion_down<MotionDepth::accelerations>(rig.tree, rig.constants, rig.slots.data(), rig.slots.size(), rig.q, rig.v, rig.a,
+                                               rig.motions);
 };
 inline constexpr auto prepare_nothing = [](auto&) {};
 
 inline VectorXd eigen(const Field<double>& field) { return vector(field); }
 
 template <class Prepare, class Run>
-void check_query(const Prepare& prepare, const Run& run, const std::vector<std::string>& writes, const std::vector<std::string>& world_left = {}) {
+void check_query(const Prepare& prepare, const Run& run, const std::vector<std::string>& writes,
+                 const std::vector<std::string>& world_left = {}) {
   for (const Model& model : mixed_trees()) {
     constexpr std::size_t count = 2 * Pack::size + 1;
     std::vector<std::vector<double>> plain(count), packed(count);
@@ -130,7 +132,8 @@ void check_query(const Prepare& prepare, const Run& run, const std::vector<std::
         if (contains(writes, name)) {
           found += 1;
           const std::size_t left = contains(world_left, name) ? field.flat().size() / static_cast<std::size_t>(field.rows()) : 0;
-          CHECK(std::all_of(field.flat().begin() + static_cast<std::ptrdiff_t>(left), field.flat().end(), [](double x) { return std::isfinite(x); }));
+          CHECK(std::all_of(field.flat().begin() + static_cast<std::ptrdiff_t>(left), field.flat().end(),
+                            [](double x) { return std::isfinite(x); }));
           plain[k].insert(plain[k].end(), field.flat().begin() + static_cast<std::ptrdiff_t>(left), field.flat().end());
         } else {
           CHECK(std::equal(was.begin(), was.end(), field.flat().begin(), same_bits));
@@ -156,7 +159,8 @@ void check_query(const Prepare& prepare, const Run& run, const std::vector<std::
           const bool equal = std::equal(numbers.begin(), numbers.end(), packed[k].begin(), same_bits);
           const auto size = static_cast<Eigen::Index>(numbers.size());
           const auto expected = Eigen::Map<const VectorXd>(plain[k].data(), size);
-          const bool close = (Eigen::Map<const VectorXd>(numbers.data(), size) - expected).cwiseAbs().maxCoeff() <= 1e-12 * expected.cwiseAbs().maxCoeff();
+          const bool close =
+              (Eigen::Map<const VectorXd>(numbers.data(), size) - expected).cwiseAbs().maxCoeff() <= 1e-12 * expected.cwiseAbs().maxCoeff();
           if (equal && close) continue;
           CAPTURE(model.names.model, stride, round, l);
           REQUIRE(equal);
