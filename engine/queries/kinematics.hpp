@@ -58,6 +58,7 @@ class Kinematics {
  public:
   /// At rest in the zero configuration, gravity 0 0 -9.81 m/s^2. The model must outlive it.
   explicit Kinematics(const Model& model);
+  explicit Kinematics(Model&&) = delete;
   /// A state; v and a may be left out, for zero.
   Kinematics(const Model& model, std::span<const double> q, std::span<const double> v = {}, std::span<const double> a = {});
   /// What a simulation is in now, its gravity and armature with it: accelerations are those of Simulation::accelerations, zero at orders
