@@ -12,6 +12,8 @@
 #include <thread>
 
 #include "engine/effects/effect_plan.hpp"
+#include "engine/queries/batch_observer.hpp"
+#include "engine/queries/observations.hpp"
 #include "engine/randomization.hpp"
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
@@ -86,6 +88,7 @@ struct BatchOf<Real>::Data {
   struct Worker {
     std::unique_ptr<BlockStepper<Real>> block;
     std::unique_ptr<InstanceStepper> instance;
+    std::unique_ptr<BatchObserver<Real>> observer;  // for the observations that were asked for last
   };
 
   std::shared_ptr<const Model> model;
@@ -192,6 +195,42 @@ struct BatchOf<Real>::Data {
       });
     }
     return {numbers, count_of(entries), lanes, size};
+  }
+
+  void check_observations(const Observations& observations, std::size_t room) const {
+    const ObservationSchedule& schedule = *observations.schedule();
+    require_same_model(schedule, *model);
+    if (schedule.targets) require_same_servos(schedule, plan.effects.servos.size());
+    const std::size_t expected = static_cast<std::size_t>(size) * static_cast<std::size_t>(observations.width());
+    if (room != expected) {
+      throw InputError(fmt::format("observations of {} instances: room for {} numbers given, expected {} x {} = {}", size, room, size,
+                                   observations.width(), expected));
+    }
+    if (!schedule.accelerations) return;
+    const char* const why = std::is_same_v<Real, float> ? "in single precision it keeps too little of its last steps"
+                            : !model->mimics.empty()    ? "with mimic joints it keeps one step alone"
+                                                        : nullptr;
+    if (why != nullptr) throw InputError(fmt::format("accelerations were asked of a batch: {}; leave them out, or ask a Simulation", why));
+  }
+
+  /// Row i of `to` is what is seen of instance i.
+  template <class Number>
+  void observe(const Observations& observations, std::span<Number> to) {
+    check_observations(observations, to.size());
+    const auto width = static_cast<std::size_t>(observations.width());
+    for_blocks([&](std::int64_t b, Worker& mine) {
+      if (!mine.observer || mine.observer->schedule() != observations.schedule().get()) {
+        const BlockSetup<Real> setup{*model, constants, options, plan};
+        mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), setup, instructions);
+      }
+      const Block<Real> here = block(b);
+      const std::span<const Real> rows = mine.observer->observe(here, *mine.block);
+      const auto stride = static_cast<std::size_t>(lanes);
+      for (int l = 0; l < here.count; ++l) {
+        Number* const row = to.data() + static_cast<std::size_t>(b * lanes + l) * width;
+        for (std::size_t k = 0; k < width; ++k) row[k] = static_cast<Number>(rows[k * stride + static_cast<std::size_t>(l)]);
+      }
+    });
   }
 
   Real* mass_row(std::int64_t i, Index slot) {
@@ -432,6 +471,15 @@ typename BatchOf<Real>::Observation BatchOf<Real>::observe() const {
     worker.block->observe(data_->block(b), seen.velocity_numbers.data() + data_->at(b, nv), seen.energy_numbers.data() + data_->at(b, 2));
   });
   return seen;
+}
+
+template <class Real>
+void BatchOf<Real>::observe(const Observations& observations, std::span<double> to) const {
+  data_->observe(observations, to);
+}
+template <class Real>
+void BatchOf<Real>::observe(const Observations& observations, std::span<float> to) const {
+  data_->observe(observations, to);
 }
 
 template <class Real>

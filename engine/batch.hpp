@@ -37,6 +37,7 @@
 
 namespace linden {
 
+class Observations;  // engine/queries/observations.hpp
 struct Scene;
 
 /// What a batch is computed with. No result depends on the threads; with other instructions results differ by rounding.
@@ -159,6 +160,12 @@ class BatchOf {
     BatchView<const Real> energies() const { return {energy_numbers, 2, lanes, size}; }
   };
   Observation observe() const;
+
+  /// What was asked for (engine/queries/observations.hpp) of every instance, on all threads: [size x width], instance by instance. Frozen
+  /// instances are seen in their last good state. Throws InputError for another length, for observations of another model, and for
+  /// accelerations where a batch does not know them: in single precision, and of models with mimic joints.
+  void observe(const Observations& observations, std::span<double> to) const;
+  void observe(const Observations& observations, std::span<float> to) const;
 
   const InstanceRecord& record(std::int64_t i) const;
   BatchSummary summary() const;

@@ -16,6 +16,17 @@ set(linden_public_headers
   engine/instance_record.hpp
   engine/mass_distribution.hpp
   engine/options.hpp
+  engine/queries/centre_of_mass.hpp
+  engine/queries/energy_by_effect.hpp
+  engine/queries/imu.hpp
+  engine/queries/inverse_dynamics.hpp
+  engine/queries/jacobian.hpp
+  engine/queries/kinematics.hpp
+  engine/queries/link_motion.hpp
+  engine/queries/mass_matrix.hpp
+  engine/queries/matrix.hpp
+  engine/queries/observations.hpp
+  engine/queries/step_forces.hpp
   engine/randomization.hpp
   engine/scene/load_model.hpp
   engine/scene/scene.hpp

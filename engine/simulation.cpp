@@ -126,6 +126,15 @@ void Simulation::set_servo_targets(std::span<const double> targets) {
   std::ranges::copy(targets, to.begin());
 }
 
+std::vector<double> Simulation::servo_targets() {
+  const std::span<const double> now = stepper_->controls().servo_targets();
+  std::vector<double> targets(now.begin(), now.end());
+  for (std::size_t k = 0; k < targets.size(); ++k) {
+    if (std::isnan(targets[k])) targets[k] = plan_->effects.servos[k].target_at(time());
+  }
+  return targets;
+}
+
 namespace {
 
 void require_not_negative(const std::string& what, double number) {
@@ -268,6 +277,20 @@ std::vector<BodyContact> Simulation::contacts() const {
     bodies.back().normal_force += impulses.ground[k] / options_.step;
   }
   return bodies;
+}
+
+std::vector<double> Simulation::accelerations() const {
+  if (stage_guess_) {
+    throw InputError(fmt::format("accelerations were asked for at order {}; expected order 2: sub-steps differ in length", options_.order));
+  }
+  std::vector<double> rows(static_cast<std::size_t>(model_->tree.shape.velocities), 0.0);
+  if (history_ < 2) return rows;
+  const double rate = 1 / options_.step;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto row = static_cast<Index>(k);
+    rows[k] = rate * (rate * (state_.history(row, 0) - state_.history(row, 1)));
+  }
+  return rows;
 }
 
 Energy Simulation::energy() { return stepper_->energy_of(state_, rate_); }

@@ -46,6 +46,14 @@ struct BodyContact {
   double normal_force = 0;  // of all of them, mean over the step [N]
 };
 
+/// Where the ground pushes a body, in the step taken last.
+struct ContactPoint {
+  Index slot;                        // body that it pushes
+  std::array<double, 3> place{};     // where they touch, world frame [m]
+  std::array<double, 3> normal{};    // of the ground there, unit length, world frame
+  std::array<double, 3> force{};     // on the body, friction with it, mean over the step; world frame [N]
+};
+
 class Simulation {
  public:
   /// At rest in the model's zero configuration, but for joints whose motion is given. Throws InputError for options and effects that make no sense, and for a null pointer.
@@ -68,6 +76,10 @@ class Simulation {
   std::span<const double> momenta() const { return state_.p.flat(); }
   /// Velocities of the motion: one O(n) solve (engine/VELOCITY.md).
   std::vector<double> velocities();
+  /// Accelerations of the motion [nv]: what the mean velocities of the last two steps differ by, over the step, which is how fast they
+  /// change at the node between the two. Zero where less than two steps are known: after a start, a change of the state, a blow at a limit or a
+  /// step that was split. Throws InputError for an order above 2, whose sub-steps differ in length.
+  std::vector<double> accelerations() const;
 
   /// Throw InputError for a wrong count or a number that is not finite. Quaternions are normalised; mimic joints follow their
   /// leaders, and joints whose motion is given are where it is, whatever is given for them. set_positions keeps the velocities, not the momenta.
@@ -82,6 +94,8 @@ class Simulation {
   /// have a table the number goes over it from now on, and NaN gives the servo back to its table; target velocity and feed-forward go on
   /// as the effects say. Throws InputError for a wrong count or another number that is not finite.
   void set_servo_targets(std::span<const double> targets);
+  /// As they are now: those that were set, else those of the effects at this time.
+  std::vector<double> servo_targets();
   /// Factors of the servos' stiffness and damping as the effects have them, in the order of Effects::servos, likewise; none negative.
   void set_gains(std::span<const double> factors);
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise; none negative.
@@ -113,6 +127,12 @@ class Simulation {
   std::vector<double> servo_torques() const;
   /// Of every body that may touch the ground, sorted by slot.
   std::vector<BodyContact> contacts() const;
+  /// Every place where the ground pushes at the end of the step, sorted by slot; the forces of one that it pushed before, and does not any
+  /// more, are not among them.
+  std::vector<ContactPoint> contact_points() const;
+  /// Wrench of all effects on each body [slots x 6]: moment about its origin [N m], force [N]; in the frame that the body had when the step
+  /// began.
+  std::vector<double> body_wrenches() const;
 
   Energy energy();
   /// What effects gave and took since the start, or since a checkpoint was loaded [J]. Total energy plus what was taken less what was given

@@ -21,7 +21,7 @@ double inner_slope(double d0, double d1, double h0, double h1) {
 }
 
 /// What keeps each piece within the range of its ends.
-std::vector<double> level_slopes(const Course& points) {
+std::vector<double> level_slopes(const TimeTable& points) {
   const std::size_t pieces = points.times.size() - 1;
   std::vector<double> slopes(pieces + 1, 0.0), h(pieces), d(pieces);
   for (std::size_t k = 0; k < pieces; ++k) {
@@ -39,7 +39,7 @@ std::vector<double> level_slopes(const Course& points) {
 
 }  // namespace
 
-SmoothCurve::SmoothCurve(const Course& points, std::span<const double> slopes)
+SmoothCurve::SmoothCurve(const TimeTable& points, std::span<const double> slopes)
     : points_(points), slopes_(slopes.empty() ? level_slopes(points) : std::vector<double>(slopes.begin(), slopes.end())) {}
 
 SmoothCurve::Piece SmoothCurve::piece(std::size_t k, double time) const {

@@ -1,5 +1,5 @@
 // layout/smooth_curve.hpp
-// A smooth curve through the points of a Course: cubic between them, with one slope at each, so that what moves along it has no jump of
+// A smooth curve through the points of a TimeTable: cubic between them, with one slope at each, so that what moves along it has no jump of
 // velocity but at its ends. Before the first point and after the last it is level.
 //
 //   slopes given    those
@@ -25,7 +25,7 @@ namespace linden {
 class SmoothCurve {
  public:
   /// Times must ascend, no two of them equal; slopes: none, or one a point.
-  explicit SmoothCurve(const Course& points, std::span<const double> slopes = {});
+  explicit SmoothCurve(const TimeTable& points, std::span<const double> slopes = {});
 
   double at(double time) const;
   /// To the right of a time where it jumps, as at the first point and the last.
@@ -43,7 +43,7 @@ class SmoothCurve {
   Piece piece(std::size_t k, double time) const;
   bool within(double time) const { return points_.times.size() > 1 && time >= points_.times.front() && time < points_.times.back(); }
 
-  Course points_;
+  TimeTable points_;
   std::vector<double> slopes_;
 };
 

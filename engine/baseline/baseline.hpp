@@ -86,7 +86,7 @@ class Baseline {
   std::int64_t steps_ = 0, evaluations_ = 0;
   Field<double> q_, v_, good_q_, good_v_;
   Field<double> stage_u_, stage_v_, rate_u_, rate_v_, sum_u_, sum_v_;
-  Field<double, 36> none_;  // no pull on any body
+  Field<double, 36> none_;  // stiffness of bodies: of none
   Field<double, 12> pose_;  // of bodies in the world, where something acts on them
   Workspace<double> work_;
   std::unique_ptr<MimicTies<double>> ties_;

@@ -15,7 +15,7 @@ constexpr double kLeastStrike = 1e-12;
 
 /// Changes of what is held in one blow: those after which one limit alone changes, and those after which it stays as it is, whatever rounding
 /// makes of it.
-constexpr int kLate = 10, kMostRevisions = 200;
+constexpr int kLate = 10, kMostUpdates = 200;
 
 }  // namespace
 
@@ -107,9 +107,9 @@ Blows::Bound Blows::bound(const State<double>& state, const JointLimit& limit, b
 }
 
 void Blows::solve() {
-  for (int revision = 0; revision < kMostRevisions; ++revision) {
+  for (int update = 0; update < kMostUpdates; ++update) {
     respond();
-    if (!revise(revision >= kLate)) return;
+    if (!update_states(update >= kLate)) return;
   }
 }
 
@@ -134,7 +134,7 @@ void Blows::respond() {
 
 /// Limits that would have to pull let go, and what passes a bound is held there; one_by_one: the last of them alone, which never goes round in
 /// circles (Murty's rule, as in limits.hpp). Returns whether something changed.
-bool Blows::revise(bool one_by_one) {
+bool Blows::update_states(bool one_by_one) {
   bool changed = false;
   for (std::size_t k = bounds_.size(); k-- > 0 && !(one_by_one && changed);) {
     Bound& bound = bounds_[k];

@@ -68,7 +68,7 @@ class Blows {
   /// change_ and impulse_ of the blow within the bounds.
   void solve();
   void respond();
-  bool revise(bool one_by_one);
+  bool update_states(bool one_by_one);
 
   TreeSweeps<true>& sweeps_;
   std::vector<Bound> bounds_;  // of each limit

@@ -142,7 +142,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
   if (effects.ground) place_ground(model, options);
   const LawSetup known = setup(tree);
   sort_bodies(known);
-  bodies = !touched.empty();
+  bodies = !loaded_bodies.empty();
   follow_laws(known);
   bounces = std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return limit.restitution > 0; });
   if (std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return std::isfinite(limit.velocity); })) {
@@ -186,19 +186,19 @@ void EffectPlan::place_ground(const Model& model, const Options& options) {
 
 /// What the laws of bodies touch, body by body.
 void EffectPlan::sort_bodies(const LawSetup& setup) {
-  std::map<Index, TouchedBody> by_slot;
+  std::map<Index, LoadedBody> by_slot;
   std::size_t place = 0;
   each_law_type<BodyLaws<double>>([&]<class Law>() {
     const auto list = Law::touching(setup);
     for (std::size_t k = 0; k < list.size(); ++k) {
-      TouchedBody& body = by_slot[list[k].slot];
+      LoadedBody& body = by_slot[list[k].slot];
       body.slot = list[k].slot;
       if (body.ranges[place].last == 0) body.ranges[place].first = k;
       body.ranges[place].last = k + 1;
     }
     ++place;
   });
-  for (const auto& [slot, body] : by_slot) touched.push_back(body);
+  for (const auto& [slot, body] : by_slot) loaded_bodies.push_back(body);
 }
 
 /// What the steppers have to know of what acts.
@@ -212,7 +212,7 @@ void EffectPlan::follow_laws(const LawSetup& setup) {
     const auto list = Law::touching(setup);
     if (list.empty()) return;
     kept_ += Law::kept_numbers(setup);
-    revises = revises || Law::facts.has_states;
+    has_states = has_states || Law::facts.has_states;
     is_implicit.template operator()<Law>(list, [&](const auto& entry) { return setup.mass_of(entry.slot); });
   });
   each_law_type<JointLaws<double>>([&]<class Law>() {
@@ -220,12 +220,12 @@ void EffectPlan::follow_laws(const LawSetup& setup) {
     if (list.empty()) return;
     kept_ += Law::kept_numbers(setup);
     for (const auto& entry : list) {
-      revises = revises || settles(entry);
+      has_states = has_states || settles(entry);
       balls = balls || Law::on_ball(entry, setup);
     }
     is_implicit.template operator()<Law>(list, [&](const auto& entry) { return setup.inertia_at(entry.row); });
   });
-  bends = bends || revises;
+  bends = bends || has_states;
 }
 
 void EffectPlan::put_positions(double time, std::span<double> q) const {

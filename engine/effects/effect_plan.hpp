@@ -23,7 +23,7 @@ namespace linden {
 inline constexpr double kAnyBend = 1e36;
 
 /// What the laws of bodies (kernels/effects/laws.hpp) have on one body.
-struct TouchedBody {
+struct LoadedBody {
   struct Range {
     std::size_t first = 0, last = 0;  // [first, last) of what the law touches
   };
@@ -40,8 +40,9 @@ struct EffectPlan {
   bool bodies = false;   // on bodies
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
   bool bounces = false;  // some limit has a restitution
-  bool revises = false;  // what acts is settled within the solve: some effect has states
-  bool bends = false;    // velocities are held to how the motion bends (engine/VELOCITY.md): something revises, or acts more at the beginning of a step
+  bool has_states = false;  // what acts is settled within the solve: some effect has states
+  bool bends = false;    // velocities are held to how the motion bends (engine/VELOCITY.md): something has states, or acts more at
+                         // the beginning of a step
   bool any() const { return joints || bodies; }
 
   Field<Index> q_row;               // position row of a screw's velocity row
@@ -51,7 +52,7 @@ struct EffectPlan {
   Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
   GroundPlan ground;                // no points without ground
-  std::vector<TouchedBody> touched;  // sorted by slot
+  std::vector<LoadedBody> loaded_bodies;  // sorted by slot
 
   /// What laws are built from.
   LawSetup setup(const Tree& tree) const { return {effects, tree, q_row, inertia, mass, curves, ground, step_}; }

@@ -4,7 +4,7 @@
 //   begin            means of tables over the step; states (sticks? at its limit?) as the first guess suggests
 //   +-> bodies       forces on bodies, after their momenta are known                 once an evaluation
 //   |   joints       impulses of joints into the target of the residual              once an evaluation
-//   |   revise       states that belong to the solution so far: did one change?      where some effect has states
+//   |   update_states       states that belong to the solution so far: did one change?      where some effect has states
 //   +-- until none changes and the residual is small
 //   end              impulses of the end of the step, work of each effect
 //
@@ -66,22 +66,22 @@ class EffectSweeps {
   template <class Action>
   void with_added(const Action& action) const {
     const Field<S>& stiffness = sum_.stiffness;
-    const Field<S, 36>& pull = bodies_.pull;
-    if (plan_.joints && plan_.bodies) return action(EffectsAdded<S, true, true>{stiffness, pull});
-    if (plan_.joints) return action(EffectsAdded<S, true, false>{stiffness, pull});
-    action(EffectsAdded<S, false, true>{stiffness, pull});
+    const Field<S, 36>& body_stiffness = bodies_.body_stiffness;
+    if (plan_.joints && plan_.bodies) return action(EffectsAdded<S, true, true>{stiffness, body_stiffness});
+    if (plan_.joints) return action(EffectsAdded<S, true, false>{stiffness, body_stiffness});
+    action(EffectsAdded<S, false, true>{stiffness, body_stiffness});
   }
   /// The same for the mass matrix, of which armature is the only part that is an effect.
   template <class Action>
   void with_rotors(const Action& action) const {
     if (rotors_.rows() == 0) return action(NothingAdded{});
-    action(EffectsAdded<S, true, false>{rotors_, bodies_.pull});
+    action(EffectsAdded<S, true, false>{rotors_, bodies_.body_stiffness});
   }
   /// And for the mass matrix that velocities are read with, after begin_reading, or that a blow is found with, after begin_blow: joints that
   /// are held are taken out.
   template <class Action>
   void with_reading(const Action& action) const {
-    action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.pull});
+    action(EffectsAdded<S, true, false>{reading_stiffness_, bodies_.body_stiffness});
   }
   /// Where momentum_target_map leaves the target that effects are taken from.
   Field<S>& plain_target() { return sum_.plain_target; }
@@ -116,7 +116,7 @@ class EffectSweeps {
   void set_out(double step, const Field<S>& q) {
     h_ = as<S>(step);
     q_ = &q;
-    creep_ = 0;
+    stiction_speed_ = 0;
   }
   /// A step from `times` on. delta: the first guess, moved into the limits. before: displacement of the step before, where it is `known`.
   /// passable: limits that joints bounce off, see limits.hpp.
@@ -138,7 +138,7 @@ class EffectSweeps {
   template <class Element>
   void bodies(const BodyConstants<Element>& constants, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
     const StepView<S> view = this->view();
-    for (const TouchedBody& body : plan_.touched) {
+    for (const LoadedBody& body : plan_.loaded_bodies) {
       clear_body(bodies_, body.slot);
       auto range = body.ranges.begin();
       const auto add = [&](auto& law) LINDEN_INLINE_LAMBDA {
@@ -168,13 +168,13 @@ class EffectSweeps {
 
   /// States that belong to the solution so far. Where the residual is small impulses that hold can be judged. delta is changed where a joint
   /// comes to rest. Of what sticks too hard all start to slide, or late that alone which does most: slower, and hardly ever in a circle.
-  /// Softly only limits have states to revise. Returns in which instances something changed: the factor is out of date there.
-  MaskOf<S> revise(const Field<S>& residual, const Revision<MaskOf<S>>& now, Field<S>& delta) {
+  /// Softly only limits have states to update_states. Returns in which instances something changed: the factor is out of date there.
+  MaskOf<S> update_states(const Field<S>& residual, const StateUpdate<MaskOf<S>>& now, Field<S>& delta) {
     using std::max;
     const StepView<S> view = this->view();
     auto changed = S(0.0) > S(1.0);
     S least(0.0);
-    if (!soft() && any(now.late)) {
+    if (!is_regularized() && any(now.late)) {
       S overload(0.0);
       const auto see = [&](const auto& law) LINDEN_INLINE_LAMBDA { overload = max(overload, law.overload(view, residual)); };
       each_law(joint_laws_, see);
@@ -183,13 +183,13 @@ class EffectSweeps {
     }
     each_law(joint_laws_, [&]<class Law>(Law& law) LINDEN_INLINE_LAMBDA {
       if constexpr (Law::facts.has_states) {
-        if (!(soft() && Law::kFollows)) changed = law.revise(view, now, least, residual, delta) || changed;
+        if (!(is_regularized() && Law::kFollows)) changed = law.update_states(view, now, least, residual, delta) || changed;
       }
     });
-    if (soft()) return changed;
+    if (is_regularized()) return changed;
     if (plan_.joints && any(changed)) assemble();
     each_law(body_laws_, [&]<class Law>(Law& law) LINDEN_INLINE_LAMBDA {
-      if constexpr (Law::facts.has_states) changed = law.revise(view, now, least, residual, delta) || changed;
+      if constexpr (Law::facts.has_states) changed = law.update_states(view, now, least, residual, delta) || changed;
     });
     return changed;
   }
@@ -216,17 +216,17 @@ class EffectSweeps {
   }
   const GivenMotions<S>& motions() const { return law<MotionLaw<S>>().motions(); }
 
-  /// Friction that is smooth up to this speed, until harden. joints() then goes by delta alone.
-  void soften(double creep, Field<S>& delta) {
-    if (soft()) each_law(joint_laws_, [&](const auto& law) { law.soften(creep / creep_, delta); });
-    creep_ = creep;
+  /// Friction that is smooth up to this speed, until end_regularization. joints() then goes by delta alone.
+  void regularize(double stiction_speed, Field<S>& delta) {
+    if (is_regularized()) each_law(joint_laws_, [&](const auto& law) { law.regularize(stiction_speed / stiction_speed_, delta); });
+    stiction_speed_ = stiction_speed;
   }
   /// Friction as it is again, from the states that the smooth one has led to.
-  void harden() {
-    creep_ = 0;
+  void end_regularization() {
+    stiction_speed_ = 0;
     if (plan_.joints) assemble();
   }
-  bool soft() const { return creep_ > 0; }
+  bool is_regularized() const { return stiction_speed_ > 0; }
   /// While soft: states by the value of delta.
   void follow(const Field<S>& delta) {
     const StepView<S> view = this->view();
@@ -241,11 +241,11 @@ class EffectSweeps {
   /// Impulses of the beginning become those of the end, but for being seen from the new poses.
   void add_ends(const Field<S, 12>& placement, const Field<S, 7>& displacement, Field<S, 6>& impulse) {
     const S rate = S(1.0) / h_;
-    for (const TouchedBody& body : plan_.touched) {
+    for (const LoadedBody& body : plan_.loaded_bodies) {
       const auto D = load<Displacement, S>(displacement, body.slot);
-      store(bodies_.uneven, body.slot, rate * carried(D, load<Wrench, S>(bodies_.uneven, body.slot)));
+      store(bodies_.start_excess, body.slot, rate * carried(D, load<Wrench, S>(bodies_.start_excess, body.slot)));
     }
-    add_given_up(tree_, placement, bodies_.given, impulse);
+    add_given_up(tree_, placement, bodies_.applied, impulse);
   }
 
   /// What the momenta get at the end of the step; a joint that is held leaves nothing of its residual to the next step.
@@ -258,14 +258,14 @@ class EffectSweeps {
     const S most = as<S>(std::numeric_limits<typename ElementOf<S>::type>::max()), zero(0.0);
     each_law(joint_laws_, [&](auto& law) LINDEN_INLINE_LAMBDA { law.keep(residual); });
     for (Index row = 0; row < end.rows(); ++row) {
-      S uneven = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
-      if (rotors_.rows() > 0) uneven = uneven + rotors_(row) * delta(row);
+      S start_excess = -half * (sum_.offset(row) + sum_.end_offset(row) + (sum_.gain(row) + sum_.end_gain(row)) * delta(row));
+      if (rotors_.rows() > 0) start_excess = start_excess + rotors_(row) * delta(row);
       const auto held = sum_.stiffness(row) > most;
-      S excess = select(held && abs(delta(row)) <= farthest, as<S>(kHeld), rate * uneven);
+      S excess = select(held && abs(delta(row)) <= farthest, as<S>(kHeld), rate * start_excess);
       if (plan_.fastest.rows() > 0) {
         // what holds a joint at its limit of velocity acts on, all of it at the beginning
         const auto at_speed = held && delta(row) != zero && abs(delta(row)) == h_ * as<S>(plan_.fastest(row));
-        excess = select(at_speed, rate * (uneven + half * residual(row)), excess);
+        excess = select(at_speed, rate * (start_excess + half * residual(row)), excess);
       }
       residual(row) = select(held, zero, residual(row));
       excess_(row) = excess;
@@ -282,7 +282,7 @@ class EffectSweeps {
     using std::abs;
     const S most = as<S>(kMostRead), zero(0.0), rate = as<S>(kMostBend) / h_, any = as<S>(kAnyBend);
     if (plan_.bodies) {
-      std::ranges::copy(bodies_.uneven.flat(), scratch.flat().begin());
+      std::ranges::copy(bodies_.start_excess.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
     }
     auto stopped = zero > zero;  // a limit has stopped a joint, and changed all velocities
@@ -290,7 +290,7 @@ class EffectSweeps {
       S read = plan_.joints ? excess_(row) : zero;
       stopped = stopped || (read > most && delta(row) != zero);
       if (plan_.bodies) {
-        read = select(read > most, read, read + lasting(projected(row), excess_before_(row)));
+        read = select(read > most, read, read + persistent(projected(row), excess_before_(row)));
         excess_before_(row) = select(moves, projected(row), excess_before_(row));
       }
       reading_(row) = select(moves, read, reading_(row));
@@ -392,7 +392,7 @@ class EffectSweeps {
   };
   Parts parts() { return {joint_laws_, body_laws_, sum_, bodies_}; }
   /// The step that was set out.
-  StepView<S> view() const { return {{*q_, plan_.q_row, tree_}, h_, creep_}; }
+  StepView<S> view() const { return {{*q_, plan_.q_row, tree_}, h_, stiction_speed_}; }
   /// Taken from the work of the ground once the potential at the end is known.
   S ground_stored() const { return ground().stored(); }
 
@@ -434,7 +434,7 @@ class EffectSweeps {
   const EffectPlan& plan_;
   const Tree& tree_;
   S h_{};
-  double creep_ = 0;
+  double stiction_speed_ = 0;
   Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
   Field<S> excess_before_;     // the same of bodies, seen from the joints, of the step before
   Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held

@@ -26,6 +26,8 @@ class ImpulseAccount {
     sum_.servos.assign(plan.effects.servos.size(), 0);
     sum_.ground.assign(plan.ground.points.size(), 0);
     sum_.closed.assign(plan.ground.points.size(), 0);
+    if (plan.bodies) sum_.bodies.assign(static_cast<std::size_t>(shape.slots) * 6, 0);
+    for (std::vector<double>* numbers : {&sum_.pushes, &sum_.normals, &sum_.places}) numbers->assign(plan.ground.points.size() * 3, 0);
     projected_.allocate(shape.velocities);
     end_.allocate(shape.velocities);
     wrench_.allocate(shape.slots);
@@ -58,17 +60,31 @@ class ImpulseAccount {
       }
     }
     if (!plan.bodies) return;
-    std::ranges::copy(effects.body_sum().given.flat(), wrench_.flat().begin());
+    std::ranges::copy(effects.body_sum().applied.flat(), wrench_.flat().begin());
+    for (std::size_t k = 0; k < sum_.bodies.size(); ++k) sum_.bodies[k] += rate * wrench_.flat()[k];
     impulse_up(model.tree, model.constants, placement, wrench_, projected_);
     for (Index row = 0; row < projected_.rows(); ++row) sum_.joints[static_cast<std::size_t>(row)] += rate * projected_(row);
     const GroundPoints<double>& points = effects.points();
     for (std::size_t k = 0; k < sum_.ground.size(); ++k) {
       sum_.ground[k] += h * points.push(static_cast<Index>(k));
       sum_.closed[k] = points.closed(static_cast<Index>(k)) > 0.5 ? 1 : 0;
+      if (points.push(static_cast<Index>(k)) != 0) add_push(effects, plan.ground.points[k].slot, k, h);
     }
   }
 
  private:
+  /// What contact point k gives its body, with friction, and where.
+  void add_push(const EffectSweeps<double>& effects, Index slot, std::size_t k, double h) {
+    const GroundPoints<double>& points = effects.points();
+    const auto row = static_cast<Index>(k);
+    const Mat3<double> R = load<Placement, double>(effects.body_sum().pose, slot).R;
+    const auto n = load<Vec3, double>(points.normal, row);
+    const Vec3<double> push = R * (h * (points.push(row) * n + load<Vec3, double>(points.drag, row)));
+    (Vec3<double>::from(&sum_.pushes[3 * k]) + push).to(&sum_.pushes[3 * k]);
+    (R * n).to(&sum_.normals[3 * k]);
+    load<Vec3, double>(points.place, row).to(&sum_.places[3 * k]);
+  }
+
   StepImpulses sum_;
   Field<double> projected_, end_;
   Field<double, 6> wrench_;

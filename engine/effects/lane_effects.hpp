@@ -90,9 +90,9 @@ class LaneEffects {
       energy = energy + armature_energy<Pack>(plan.effects.armature, work.delta);
     }
     const auto& stiffness = sweeps_.joint_sum().stiffness;
-    const auto& pull = sweeps_.body_sum().pull;
-    if (plan.bodies) return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, true>{stiffness, pull});
-    return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, false>{stiffness, pull});
+    const auto& body_stiffness = sweeps_.body_sum().body_stiffness;
+    if (plan.bodies) return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, true>{stiffness, body_stiffness});
+    return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, false>{stiffness, body_stiffness});
   }
 
   /// Velocities no farther from the mean ones of the last step than the motion bends.

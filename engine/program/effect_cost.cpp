@@ -19,9 +19,9 @@ constexpr double kSecondsOfEach = 0.15;  // of steps of each, over all rounds
 using Clock = std::chrono::steady_clock;
 
 /// One way to take the scene, a few steps at a time.
-class Contender {
+class Variant {
  public:
-  Contender(std::string name, std::shared_ptr<const Model> model, const Scene& scene, const Effects& effects)
+  Variant(std::string name, std::shared_ptr<const Model> model, const Scene& scene, const Effects& effects)
       : name_(std::move(name)), simulation_(std::move(model), scene.options, effects), start_(scene.initial) {
     begin();
   }
@@ -58,9 +58,9 @@ class Contender {
 
 std::vector<EffectCost> effect_costs(const Scene& scene) {
   const auto model = std::make_shared<const Model>(scene.model);
-  std::vector<std::unique_ptr<Contender>> contenders;
+  std::vector<std::unique_ptr<Variant>> variants;
   const auto contend = [&](std::string name, const Effects& effects) {
-    contenders.push_back(std::make_unique<Contender>(std::move(name), model, scene, effects));
+    variants.push_back(std::make_unique<Variant>(std::move(name), model, scene, effects));
   };
   contend("none", {});
   // lists of one name are one effect
@@ -77,14 +77,14 @@ std::vector<EffectCost> effect_costs(const Scene& scene) {
   }
   contend("all", scene.effects);
   for (int round = 0; round < kRounds; ++round) {
-    for (const auto& contender : contenders) contender->take(kSecondsOfEach / kRounds);
+    for (const auto& variant : variants) variant->take(kSecondsOfEach / kRounds);
   }
   std::vector<EffectCost> costs;
-  const double none = contenders.front()->seconds_per_step();
-  for (const auto& contender : contenders) {
-    const bool whole = contender == contenders.front() || contender == contenders.back();
-    const double seconds = contender->seconds_per_step() - (whole ? 0 : none);
-    costs.push_back({contender->name(), 1e9 * seconds / model->tree.bodies()});
+  const double none = variants.front()->seconds_per_step();
+  for (const auto& variant : variants) {
+    const bool whole = variant == variants.front() || variant == variants.back();
+    const double seconds = variant->seconds_per_step() - (whole ? 0 : none);
+    costs.push_back({variant->name(), 1e9 * seconds / model->tree.bodies()});
   }
   return costs;
 }

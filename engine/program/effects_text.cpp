@@ -109,7 +109,7 @@ std::string what_of(std::span<const Servo> list, const Effects&, const Model& mo
     const auto found = std::ranges::count_if(list, has);
     if (found > 0) over_time += ", " + counted(found, what);
   };
-  const auto acts = [](const Course& course) { return std::ranges::any_of(course.values, [](double value) { return value != 0; }); };
+  const auto acts = [](const TimeTable& table) { return std::ranges::any_of(table.values, [](double value) { return value != 0; }); };
   count("moving target", [](const Servo& entry) { return entry.target_moves(); });
   count("target velocity", [&](const Servo& entry) { return acts(entry.target_velocity); });
   count("feed-forward", [&](const Servo& entry) { return acts(entry.feedforward); });
@@ -120,17 +120,17 @@ std::string what_of(std::span<const Servo> list, const Effects&, const Model& mo
 
 /// How many of them go over time, or what they are where none does.
 template <class Entry>
-std::string courses_text(std::span<const Entry> list, Course Entry::*course, const char* none) {
-  const auto tables = std::ranges::count_if(list, [&](const Entry& entry) { return (entry.*course).times.size() > 1; });
+std::string time_tables_text(std::span<const Entry> list, TimeTable Entry::*table, const char* none) {
+  const auto tables = std::ranges::count_if(list, [&](const Entry& entry) { return (entry.*table).times.size() > 1; });
   return tables == 0 ? std::string(none) : fmt::format("{} over time", tables);
 }
 
 std::string what_of(std::span<const JointTorque> list, const Effects&, const Model&) {
-  return courses_text(list, &JointTorque::force, "constant");
+  return time_tables_text(list, &JointTorque::force, "constant");
 }
 
 std::string what_of(std::span<const JointMotion> list, const Effects&, const Model&) {
-  return courses_text(list, &JointMotion::position, "held in place");
+  return time_tables_text(list, &JointMotion::position, "held in place");
 }
 
 std::string what_of(std::span<const BodyWrench> list, const Effects&, const Model&) {
@@ -164,7 +164,7 @@ std::string where_of(std::span<const Entry> list, const Model& model) {
   }
 }
 
-Json json_of(const Course& course) { return {{"times", course.times}, {"values", course.values}}; }
+Json json_of(const TimeTable& table) { return {{"times", table.times}, {"values", table.values}}; }
 
 template <HasFields Entry>
 Json json_of(const Entry& entry) {

@@ -36,7 +36,7 @@ std::string filled(const std::string& text) {
 }
 
 /// Options of one command, each a text until all have been read.
-struct Adding {
+struct OptionAdder {
   CLI::App* command;
 
   void operator()(const char* group, const char* name, std::string& text, const char* value, const char* meaning) const {
@@ -72,7 +72,7 @@ struct Adding {
 
 CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
   CLI::App* command = program.add_subcommand("run", "Simulate one model or scene.");
-  const Adding add{command};
+  const OptionAdder add{command};
   add.model(run.model, kSceneHelp);
   add.base("Motion", texts);
   add.density("Motion", texts);
@@ -114,7 +114,7 @@ CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
 
 CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& rollout) {
   CLI::App* command = program.add_subcommand("rollout", "Simulate many instances of one model or scene at once.");
-  const Adding add{command};
+  const OptionAdder add{command};
   add.model(rollout.model, kSceneHelp);
   add("Instances", "--instances", texts.instances, "N", "how many, default 1024");
   add("Instances", "--seed", texts.seed, "K", "instance i starts from random numbers K + i, default 1");
@@ -152,7 +152,7 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
 
 CLI::App* add_scaling(CLI::App& program, OptionTexts& texts, ScalingArguments& scaling) {
   CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
-  const Adding add{command};
+  const OptionAdder add{command};
   add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random or humanoids");
   add("Models", "--dofs", texts.dofs, "A..B", "least and most degrees of freedom, default 10..100000");
   add("Models", "--seed", texts.seed, "K", "each starts from random positions and speeds, default 1");
@@ -175,7 +175,7 @@ CLI::App* add_scaling(CLI::App& program, OptionTexts& texts, ScalingArguments& s
 CLI::App* add_accuracy(CLI::App& program, OptionTexts& texts, AccuracyArguments& accuracy) {
   CLI::App* command =
       program.add_subcommand("accuracy", "Measure what accuracy costs on a model or scene, and say which method to use.");
-  const Adding add{command};
+  const OptionAdder add{command};
   add.model(accuracy.model, kSceneHelp);
   add.base("Motion", texts);
   add.density("Motion", texts);
@@ -201,7 +201,7 @@ CLI::App* add_accuracy(CLI::App& program, OptionTexts& texts, AccuracyArguments&
 CLI::App* add_inspect(CLI::App& program, OptionTexts& texts, InspectArguments& inspect) {
   CLI::App* command =
       program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
-  const Adding add{command};
+  const OptionAdder add{command};
   add.model(inspect.model, kSceneHelp);
   add.base("Options", texts);
   add.density("Options", texts);
@@ -314,7 +314,7 @@ int run_program(int argc, char** argv) {
 
 constexpr const char* kNoMemory = "there is not enough memory for that; choose a smaller model or fewer instances, or allow more (ulimit -v)";
 
-int complain(std::string_view message, int exit_code) {
+int report_error(std::string_view message, int exit_code) {
   tell_text(message);
   return exit_code;
 }
@@ -323,15 +323,15 @@ int guarded(int argc, char** argv) {
   try {
     return run_program(argc, argv);
   } catch (const MemoryError& error) {
-    return complain(error.what(), 1);
+    return report_error(error.what(), 1);
   } catch (const InputError& error) {
-    return complain(error.what(), 2);
+    return report_error(error.what(), 2);
   } catch (const std::bad_alloc&) {
-    return complain(kNoMemory, 1);
+    return report_error(kNoMemory, 1);
   } catch (const std::length_error&) {
-    return complain(kNoMemory, 1);
+    return report_error(kNoMemory, 1);
   } catch (const std::exception& error) {
-    return complain(error.what(), 1);
+    return report_error(error.what(), 1);
   }
 }
 

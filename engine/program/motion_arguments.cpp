@@ -82,7 +82,7 @@ std::string gravity_text(const Options& options) {
   return fmt::format("gravity {:g} {:g} {:g} m/s^2", g[0], g[1], g[2]);
 }
 
-LeftOut::LeftOut(const Model& model, const Effects& effects) {
+IgnoredByScene::IgnoredByScene(const Model& model, const Effects& effects) {
   for (Index slot = 1; slot < model.tree.shape.slots; ++slot) {
     const Index row = model.tree.first_v(slot);
     damping += model.attributes.damping(row) > 0 ? 1 : 0;
@@ -98,7 +98,7 @@ LeftOut::LeftOut(const Model& model, const Effects& effects) {
   if (!effects.friction.empty()) friction = 0;
 }
 
-std::string LeftOut::text() const {
+std::string IgnoredByScene::text() const {
   std::vector<std::string> parts;
   if (limits > 0) parts.push_back(fmt::format("limits of {}", counted(limits, "joint")));
   if (damping > 0) parts.push_back(fmt::format("damping of {}", damping));

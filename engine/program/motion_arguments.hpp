@@ -60,10 +60,10 @@ std::string model_text(const ModelArguments& arguments, const Model& model);
 std::string gravity_text(const Options& options);
 
 /// What the model's file says of its joints and no effect takes up.
-struct LeftOut {
+struct IgnoredByScene {
   int limits = 0, damping = 0, friction = 0;
   int velocity_limits = 0;  // where limits of positions act alone
-  explicit LeftOut(const Model& model, const Effects& effects = {});
+  explicit IgnoredByScene(const Model& model, const Effects& effects = {});
   /// Empty where there is nothing.
   std::string text() const;
 };

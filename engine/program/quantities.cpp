@@ -9,6 +9,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "engine/queries/energy_by_effect.hpp"
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
 
@@ -16,31 +17,6 @@ namespace linden {
 namespace {
 
 const std::vector<std::string> kNames{"positions", "velocities", "servos", "forces", "energies", "contacts"};
-
-struct EnergyRow {
-  std::string name;
-  double now;  // [J]
-};
-
-/// Energies that there are in the scene, and what each of its effects took or gave so far.
-std::vector<EnergyRow> energy_rows(Simulation& simulation) {
-  const Effects& effects = simulation.effects();
-  const Energy energy = simulation.energy();
-  std::vector<EnergyRow> rows{{"kinetic", energy.kinetic}};
-  if (simulation.options().gravity != std::array<double, 3>{0, 0, 0}) rows.push_back({"gravity", energy.gravity()});
-  bool springs = false;
-  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
-    springs = springs || (Entry::facts.stores && Entry::facts.site == Site::joint && !entries.empty());
-  });
-  if (springs) rows.push_back({"springs", energy.springs});
-  if (effects.ground) rows.push_back({"ground", energy.ground});
-  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
-    if (Entry::facts.account == Account::none || entries.empty()) return;
-    const std::string_view sense = Entry::facts.account == Account::taken ? "taken" : "given";
-    rows.push_back({fmt::format("{}_{}", Entry::facts.name, sense), simulation.effect_work().of<Entry>()});
-  });
-  return rows;
-}
 
 /// Quantities that there are in the scene.
 std::vector<Quantity> available(const Simulation& simulation) {
@@ -119,7 +95,7 @@ Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities) : s
         break;
       case Quantity::energies: {
         RecordedArray array{"energies", "energy_names", {}, "energy."};
-        for (const EnergyRow& row : energy_rows(simulation)) array.rows.push_back(row.name);
+        for (const EnergyShare& share : energy_by_effect(simulation)) array.rows.push_back(share.name);
         add(quantity, std::move(array));
         break;
       }
@@ -142,7 +118,7 @@ void Observer::add(Quantity quantity, RecordedArray array) {
 
 std::vector<double> Observer::energies() {
   std::vector<double> now;
-  for (const EnergyRow& row : energy_rows(simulation_)) now.push_back(row.now);
+  for (const EnergyShare& share : energy_by_effect(simulation_)) now.push_back(share.energy);
   return now;
 }
 

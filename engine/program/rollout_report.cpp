@@ -66,7 +66,9 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
     row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
     label.clear();
   }
-  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) row("ignored", left_out + "; a scene can name them");
+  if (const std::string ignored = IgnoredByScene(model, effects).text(); !ignored.empty()) {
+    row("ignored", ignored + "; a scene can name them");
+  }
   row("method", fmt::format("newton, step {:g} s, tolerance {:g} (energy), {}", options.step,
                             arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance,
                             gravity_text(options)));

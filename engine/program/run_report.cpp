@@ -75,8 +75,8 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
     row(label.c_str(), fmt::format("{}: {}, {}", line.name, line.where, line.what));
     label.clear();
   }
-  if (const std::string left_out = LeftOut(model, effects).text(); !left_out.empty()) {
-    row("ignored", left_out + "; a scene can name them");
+  if (const std::string ignored = IgnoredByScene(model, effects).text(); !ignored.empty()) {
+    row("ignored", ignored + "; a scene can name them");
   }
   row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}){}, first guess {}, {}", name(options.solver), order_text(options),
                             options.step, options.tolerance, name(options.stop), reduction_text(options), name(options.guess),
@@ -140,7 +140,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
   const auto if_any = [](bool any, double value) { return any && std::isfinite(value) ? Json(value) : Json(nullptr); };
   const auto if_given = [](const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); };
   const Effects effects = arguments.effects();
-  const LeftOut left_out(model, effects);
+  const IgnoredByScene ignored(model, effects);
   Json effect_list = Json::array();
   for (const EffectLine& line : effect_lines(effects, model)) {
     effect_list.push_back({{"name", line.name}, {"on", line.where}, {"what", line.what}});
@@ -158,10 +158,10 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"velocities", model.tree.shape.velocities},
       {"mass", model.constants.subtree_mass(0)},
       {"ignored",
-       {{"limits", left_out.limits},
-        {"damping", left_out.damping},
-        {"friction", left_out.friction},
-        {"velocity_limits", left_out.velocity_limits}}},
+       {{"limits", ignored.limits},
+        {"damping", ignored.damping},
+        {"friction", ignored.friction},
+        {"velocity_limits", ignored.velocity_limits}}},
       {"effects", effect_list},
       {"solver", name(options.solver)},
       {"guess", name(options.guess)},

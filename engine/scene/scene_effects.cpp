@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "engine/scene/number_table.hpp"
-#include "engine/scene/scene_course.hpp"
+#include "engine/scene/scene_time_table.hpp"
 #include "engine/scene/scene_joints.hpp"
 #include "engine/scene/scene_numbers.hpp"
 #include "engine/scene/scene_servos.hpp"
@@ -200,7 +200,7 @@ class EffectsReader {
     for (const Entry& entry : at.entries("{joint: number, FILE.csv or {times, values}}")) {
       const NamedJoint named = joints_.screw(entry);
       joints_.refuse_follower(entry.value, named);
-      result_.effects.torques.push_back({named.row, read_course(entry.value, folder_)});
+      result_.effects.torques.push_back({named.row, read_time_table(entry.value, folder_)});
     }
     if (result_.effects.torques.empty()) warn("no joint has any");
   }
@@ -269,7 +269,7 @@ class EffectsReader {
     if (const auto value = at.find("to")) result.to = value->number();
     if (result.from > result.to)
       at.fail(fmt::format("{} goes from {} to {} s", at.path(), result.from, result.to), "from at or before to", "exchange them");
-    if (const auto file = at.find("file")) result.scale = read_course_file(*file, folder_);
+    if (const auto file = at.find("file")) result.scale = read_time_table_file(*file, folder_);
     return result;
   }
 

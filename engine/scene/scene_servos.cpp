@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "engine/scene/scene_course.hpp"
+#include "engine/scene/scene_time_table.hpp"
 #include "layout/support/words.hpp"
 
 namespace linden {
@@ -78,12 +78,12 @@ class ServoReader {
           if (const auto own = joints->find(entry.key); own && own->find(own_key))
             entry.value.refuse(fmt::format("one {} a joint", own_key), "leave one out");
         }
-        put(found->second, read_course(entry.value, folder_));
+        put(found->second, read_time_table(entry.value, folder_));
       }
     };
     over_joints("targets", "target", set_target);
-    over_joints("velocities", "target_velocity", [](Servo& servo, Course course) { servo.target_velocity = std::move(course); });
-    over_joints("feedforward", "feedforward", [](Servo& servo, Course course) { servo.feedforward = std::move(course); });
+    over_joints("velocities", "target_velocity", [](Servo& servo, TimeTable table) { servo.target_velocity = std::move(table); });
+    over_joints("feedforward", "feedforward", [](Servo& servo, TimeTable table) { servo.feedforward = std::move(table); });
     std::vector<std::string> dead;
     for (const auto& [row, servo] : servos) {
       if (servo.stiffness == 0 && servo.damping == 0 && is_zero(servo.feedforward)) continue;
@@ -106,25 +106,25 @@ class ServoReader {
     return at->not_negative("urdf, none or a number");
   }
 
-  static bool is_zero(const Course& course) {
-    return std::ranges::all_of(course.values, [](double value) { return value == 0; });
+  static bool is_zero(const TimeTable& table) {
+    return std::ranges::all_of(table.values, [](double value) { return value == 0; });
   }
 
   /// A table, or where it is one value, that.
-  static void set_target(Servo& servo, Course course) {
-    if (course.values.size() == 1) {
-      servo.target = course.values.front();
+  static void set_target(Servo& servo, TimeTable table) {
+    if (table.values.size() == 1) {
+      servo.target = table.values.front();
     } else {
-      servo.target_over_time = std::move(course);
+      servo.target_over_time = std::move(table);
     }
   }
 
   void own_values(const SceneValue& at, Servo& servo) const {
     if (const auto value = at.find("stiffness")) servo.stiffness = value->not_negative();
     if (const auto value = at.find("damping")) servo.damping = value->not_negative();
-    if (const auto value = at.find("target")) set_target(servo, read_course(*value, folder_));
-    if (const auto value = at.find("target_velocity")) servo.target_velocity = read_course(*value, folder_);
-    if (const auto value = at.find("feedforward")) servo.feedforward = read_course(*value, folder_);
+    if (const auto value = at.find("target")) set_target(servo, read_time_table(*value, folder_));
+    if (const auto value = at.find("target_velocity")) servo.target_velocity = read_time_table(*value, folder_);
+    if (const auto value = at.find("feedforward")) servo.feedforward = read_time_table(*value, folder_);
     if (const auto value = at.find("max_force")) servo.max_force = max_force(value, servo.row);
   }
 

@@ -8,9 +8,9 @@
 //   evaluate(lanes, round)                      corrects the displacement of these lanes, the others' stays; the next evaluation of all
 //   converged(now), close(now)                  lanes whose residual is below the tolerance; nearly so
 //   at_floor(now, epsilons)                     lanes whose residual is rounding alone
-//   has_states(), revise(revision)              effects that stick, stop or saturate: lanes in which a state changed
+//   has_states(), update_states(update)              effects that stick, stop or saturate: lanes in which a state changed
 //   refused(lanes)                              of lanes that are solved those that cannot take the step in one
-//   settle(done, before, active)                these lanes are solved, those were before, others go on with what all share
+//   put_aside(done, before, active)                these lanes are solved, those were before, others go on with what all share
 //   and alone: first_correction(now, before, floor), told once what the first correction left; stale(now, before), whether the factor that
 //   was held for it will not do; cut(share), take_back(share), refactor(now), continuation(now, whole), give_up(seen)
 #pragma once
@@ -56,7 +56,7 @@ class Solve {
       solved.done |= done;
       solved.lost |= lost;
       active &= ~(done | lost);
-      sweeps_.settle(done, solved.done & ~done, active);
+      sweeps_.put_aside(done, solved.done & ~done, active);
       if (active == 0) return solved;
       if constexpr (Sweeps::kAlone) {
         if (next[static_cast<std::size_t>(Next::correct)] == 0) {
@@ -89,7 +89,7 @@ class Solve {
     if constexpr (Sweeps::kAlone) {
       if (whole != 0 && corrections_.of(0) == 1) sweeps_.first_correction(now_.norm, before_, at_floor != 0);
     }
-    const Lanes changed = revised(active & usable & ~(cut_ & ~fell), solved);
+    const Lanes changed = updated(active & usable & ~(cut_ & ~fell), solved);
     if constexpr (Sweeps::kAlone) stale = corrected_ != 0 && corrections_.of(0) == 1 && sweeps_.stale(now_, before_);
     std::array<Lanes, kNexts> next{};
     for (Lanes left = active; left != 0;) {
@@ -124,7 +124,7 @@ class Solve {
   }
 
   /// Which of these lanes have a state that is not that of the solution so far; it is changed.
-  Lanes revised([[maybe_unused]] Lanes lanes, [[maybe_unused]] Lanes solved) {
+  Lanes updated([[maybe_unused]] Lanes lanes, [[maybe_unused]] Lanes solved) {
     if (!sweeps_.has_states()) return 0;
     Lanes late = 0, last = 0;
     for (Lanes left = lanes; left != 0;) {
@@ -137,7 +137,7 @@ class Solve {
     }
     if (lanes == 0) return 0;
     const Lanes near = solved | L::bits(within(now_.norm, as<S>(kSettled * kSettled), now_.scale));
-    return lanes & sweeps_.revise({L::mask(near), L::mask(solved), L::mask(late), L::mask(last)});
+    return lanes & sweeps_.update_states({L::mask(near), L::mask(solved), L::mask(late), L::mask(last)});
   }
 
   /// The next evaluation; these lanes are corrected before it, the other active ones had a state changed.

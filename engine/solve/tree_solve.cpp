@@ -130,15 +130,15 @@ bool TreeSolve<kEffects>::stale(const Evaluated<double>& now, double before) con
 
 template <bool kEffects>
 bool TreeSolve<kEffects>::has_states() const {
-  if constexpr (kEffects) return sweeps_.effects().plan().revises;
+  if constexpr (kEffects) return sweeps_.effects().plan().has_states;
   return false;
 }
 
 /// Whether a state changed; work_.delta then says what the motion is to be.
 template <bool kEffects>
-bool TreeSolve<kEffects>::update_states([[maybe_unused]] const Revision<bool>& revision) {
+bool TreeSolve<kEffects>::changes_states([[maybe_unused]] const StateUpdate<bool>& update) {
   if constexpr (kEffects) {
-    if (!sweeps_.effects().revise(sweeps_.joint_residual(), revision, work_.delta)) return false;
+    if (!sweeps_.effects().update_states(sweeps_.joint_residual(), update, work_.delta)) return false;
     spread_mimics<double>(sweeps_.mimics(), work_.delta);  // where a coordinate comes to hold, its leader's row was set
     displacement_map(model_.tree, work_.motion, work_.delta);
     return true;
@@ -147,8 +147,8 @@ bool TreeSolve<kEffects>::update_states([[maybe_unused]] const Revision<bool>& r
 }
 
 template <bool kEffects>
-Lanes TreeSolve<kEffects>::revise(const Revision<bool>& revision) {
-  if (!update_states(revision)) return 0;
+Lanes TreeSolve<kEffects>::update_states(const StateUpdate<bool>& update) {
+  if (!changes_states(update)) return 0;
   report_->iterations += 1;
   return 1;
 }
@@ -166,13 +166,13 @@ void TreeSolve<kEffects>::continuation([[maybe_unused]] Evaluated<double>& now, 
     const auto follow = [&](double speed) {
       const bool to_the_end = whole && speed == std::end(kSmoothSpeeds)[-1];
       displacement_map(model_.tree, work_.motion, work_.delta);
-      effects.soften(speed, work_.delta);
+      effects.regularize(speed, work_.delta);
       spread_mimics<double>(sweeps_.mimics(), work_.delta);
       now = sweeps_.evaluate(Factor::fresh, *report_);
       for (int k = 0; k < kMostSmoothCorrections; ++k) {
         if (!usable(now)) return false;
         const bool near = within(now.norm, kSettled * kSettled, now.scale);
-        if (update_states({.near = near, .solved = false, .late = false, .last = false})) {
+        if (changes_states({.near = near, .solved = false, .late = false, .last = false})) {
           now = sweeps_.evaluate(Factor::fresh, *report_);
           continue;
         }
@@ -186,7 +186,7 @@ void TreeSolve<kEffects>::continuation([[maybe_unused]] Evaluated<double>& now, 
     for (const double speed : kSmoothSpeeds) {
       if (!follow(speed)) break;
     }
-    if (!whole) effects.harden();
+    if (!whole) effects.end_regularization();
     displacement_map(model_.tree, work_.motion, work_.delta);
   }
 }

@@ -38,11 +38,11 @@ class TreeSolve {
   Lanes close(const Evaluated<double>& now) const;
   Lanes at_floor(const Evaluated<double>& now, double epsilons) { return sweeps_.at_floor(now, fall(h_), epsilons) ? 1 : 0; }
   bool has_states() const;
-  Lanes revise(const Revision<bool>& revision);
+  Lanes update_states(const StateUpdate<bool>& update);
   void first_correction(double norm, double before, bool at_floor);
   bool stale(const Evaluated<double>& now, double before) const;
   Lanes refused(Lanes) const { return 0; }
-  void settle(Lanes, Lanes, Lanes) {}
+  void put_aside(Lanes, Lanes, Lanes) {}
   Evaluated<double> cut(double share);
   Evaluated<double> take_back(double share) { return tried(sweeps_.correct(-share, *report_)); }
   void refactor(Evaluated<double>& now) { sweeps_.factor_again(now, *report_); }
@@ -51,7 +51,7 @@ class TreeSolve {
 
  private:
   Evaluated<double> tried(const Evaluated<double>& now);
-  bool update_states(const Revision<bool>& revision);
+  bool changes_states(const StateUpdate<bool>& update);
   void line_search(Evaluated<double>& now, double slope_before);
 
   const Model& model_;

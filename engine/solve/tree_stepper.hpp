@@ -12,7 +12,7 @@
 //   advance_map, placement_map, gravity, momentum_update_map
 //
 // Effects (effect_sweeps.hpp) act after momentum_map and on the target, are part of the factor, and have their states - sticks, slides,
-// at a limit - revised between corrections. Compiled with them and without (kEffects): a step without asks for none.
+// at a limit - updated between corrections. Compiled with them and without (kEffects): a step without asks for none.
 //
 // The equation may have other roots, far from the motion, once a step is too large for it (judge.hpp). Whoever lands on one gains
 // energy out of nothing: where a step turns bodies by much and its solution lies far from the first guess, kinetic energy of the mean

@@ -24,7 +24,9 @@ void run_joint_part(StepMemory& memory, Part part) {
   if (part == Part::add) law.add(view, effects.parts().joints);
   if (part == Part::evaluate) law.evaluate(view, work.motion, work.momentum_target);
   if constexpr (Law::facts.has_states) {
-    if (part == Part::revise) memory.changed |= law.revise(view, memory.revision, 0.0, memory.joint_residual(), work.delta);
+    if (part == Part::update_states) {
+      memory.changed |= law.update_states(view, memory.update, 0.0, memory.joint_residual(), work.delta);
+    }
   }
 }
 
@@ -46,13 +48,15 @@ void run_body_part(StepMemory& memory, Part part) {
     if (part == Part::guess && memory.is_first) law.guess(memory.options.step, work.displacement);
   }
   if (part == Part::add) {
-    for (const TouchedBody& body : memory.plan.touched) {
+    for (const LoadedBody& body : memory.plan.loaded_bodies) {
       const auto& [first, last] = body.ranges[kPlaceOf<Law, BodyLaws<double>>];
       if (first < last) law.add(effects.view(), memory.constants, first, last, work.displacement, sum, work.impulse);
     }
   }
   if constexpr (Law::facts.has_states) {
-    if (part == Part::revise) memory.changed |= law.revise(effects.view(), memory.revision, 0.0, memory.joint_residual(), work.delta);
+    if (part == Part::update_states) {
+      memory.changed |= law.update_states(effects.view(), memory.update, 0.0, memory.joint_residual(), work.delta);
+    }
   }
   if (part == Part::keep) law.keep();
 }
@@ -69,7 +73,7 @@ void add_parts(ScheduleDraft& draft, Part part, Site site, When when) {
   const LawSetup setup = draft.plan.setup(draft.model.tree);
   const auto add = [&]<class Law>(bool acts, bool settling, auto run) {
     for (const PartSweep& sweep : Law::sweeps) {
-      if (sweep.part == part && acts && (part != Part::revise || settling)) add_part(draft, when, sweep, run);
+      if (sweep.part == part && acts && (part != Part::update_states || settling)) add_part(draft, when, sweep, run);
     }
   };
   if (site == Site::joint) {
@@ -117,7 +121,7 @@ void add_action_of_effects(ScheduleDraft& draft) {
   if (plan.bodies) {
     add_parts(draft, Part::guess, Site::body, When::evaluation);
     draft.add(When::evaluation, "clear_bodies", "", "body impulses", [](StepMemory& memory, Slots) {
-      for (const TouchedBody& body : memory.plan.touched) clear_body(memory.effects->parts().bodies, body.slot);
+      for (const LoadedBody& body : memory.plan.loaded_bodies) clear_body(memory.effects->parts().bodies, body.slot);
     });
     add_parts(draft, Part::add, Site::body, When::evaluation);
   }
@@ -138,11 +142,11 @@ void add_action_of_effects(ScheduleDraft& draft) {
 }
 
 void add_states_of_effects(ScheduleDraft& draft) {
-  if (!draft.plan.revises) return;
+  if (!draft.plan.has_states) return;
   const std::size_t none = draft.sweeps.size();
-  add_parts(draft, Part::revise, Site::joint, When::states);
+  add_parts(draft, Part::update_states, Site::joint, When::states);
   if (draft.sweeps.size() > none) add_rows(draft, When::states);
-  add_parts(draft, Part::revise, Site::body, When::states);
+  add_parts(draft, Part::update_states, Site::body, When::states);
 }
 
 void add_end_of_effects(ScheduleDraft& draft) {

@@ -126,18 +126,18 @@ class LaneSweeps {
     return L::bits(below_ceiling(now.norm, now.energy, fall())) & L::bits(is_rounding(now.norm, sum, epsilons));
   }
   bool has_states() const {
-    if constexpr (kEffects) return effects_.plan().revises;
+    if constexpr (kEffects) return effects_.plan().has_states;
     return false;
   }
-  Lanes revise([[maybe_unused]] const Revision<Mask>& revision) {
-    if constexpr (kEffects) return L::bits(effects_->revise(work_.innovation, revision, work_.delta));
+  Lanes update_states([[maybe_unused]] const StateUpdate<Mask>& update) {
+    if constexpr (kEffects) return L::bits(effects_->update_states(work_.innovation, update, work_.delta));
     return 0;
   }
   Lanes refused([[maybe_unused]] Lanes lanes) const {
     if constexpr (kEffects) return lanes != 0 ? lanes & effects_.blows(q_, work_.delta) : 0;
     return 0;
   }
-  void settle([[maybe_unused]] Lanes done, [[maybe_unused]] Lanes before, [[maybe_unused]] Lanes active) {
+  void put_aside([[maybe_unused]] Lanes done, [[maybe_unused]] Lanes before, [[maybe_unused]] Lanes active) {
     if constexpr (!kEffects) {
       if (active == 0 && before != 0) bring_back(before);
       if (active != 0 && done != 0) keep(done);

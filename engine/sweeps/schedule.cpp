@@ -278,7 +278,7 @@ void Writer::residual_by_itself() {
 }
 
 void Writer::changed() {
-  if (!draft_.plan.revises) return;
+  if (!draft_.plan.has_states) return;
   if (ties()) add(When::changed, "spread_mimics", "delta", "delta", spread);
   add(When::changed, "displacement_map", "motion", "delta", find_coordinates);
   add(When::changed, "motion_map", "screw, delta", "motion", move, Way::down);

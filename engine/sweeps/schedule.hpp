@@ -13,7 +13,7 @@
 //   correction   second half of the solve, and delta with it; another evaluation follows
 //   last         the end of the step: positions, momenta, what is kept for the next step
 //
-// A plain step is one that is not split, whose states settle before they are revised one by one, that strikes no limit and that no force
+// A plain step is one that is not split, whose states settle before they are updated one by one, that strikes no limit and that no force
 // acts on from outside. What changes no array is not in the list: energies that are booked, tests of what is solved. A correction that is
 // cut is correct_motion_map once more, with a negative share.
 //

@@ -56,7 +56,7 @@ struct StepMemory {
   Factor factor = Factor::fresh;
   bool is_first = true;            // of the step
   bool finds_end_momenta = false;  // momenta at the end of the step are found on the way
-  Revision<bool> revision{};       // how far the solve is
+  StateUpdate<bool> update{};       // how far the solve is
   bool changed = false;            // a state of an effect was not that of the solution
   double share = 1;                // of a correction that is made
 };

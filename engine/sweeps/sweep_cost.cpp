@@ -53,7 +53,7 @@ class Bench {
     memory_.begin_evaluation(Factor::fresh);
     run(sweeps, {When::evaluation, When::factor}, memory_);
     memory_.finds_end_momenta = memory_.strategy.finds_end_momenta();
-    memory_.revision = {.near = true, .solved = true, .late = false, .last = false};
+    memory_.update = {.near = true, .solved = true, .late = false, .last = false};
     memory_.share = 0;  // corrections by nothing, so that motion and displacement stay those of the step
     state_ = memory_.state;
     work_ = memory_.work;

@@ -106,7 +106,7 @@ void TreeSweeps<kEffects>::act([[maybe_unused]] Evaluated<double>& now) {
     }
     if (plan.joints) {
       if (plan.balls) displacement_map(model_.tree, work_.motion, work_.delta);
-      if (effects_.soft()) effects_.follow(work_.delta);
+      if (effects_.is_regularized()) effects_.follow(work_.delta);
       effects_.joints(work_.delta, work_.motion, work_.momentum_target);
       now.energy += armature_energy<double>(plan.effects.armature, work_.delta);
     }

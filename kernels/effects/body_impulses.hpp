@@ -12,7 +12,7 @@
 // s is that of joint_impulses.hpp. The work of a force is F.D.
 //
 // reads   displacement 7 x n
-// writes  impulse 6 x n, given 6 x n, pull 36 x n of the bodies that effects touch
+// writes  impulse 6 x n, applied 6 x n, body_stiffness 36 x n of the bodies that effects touch
 #pragma once
 
 #include <span>
@@ -25,9 +25,9 @@ namespace linden {
 
 #define LINDEN_BODY_IMPULSES_FIELDS(FIELD)                                                                \
   FIELD(Scalar, pose, 12, slots, "T: body -> world at q; rotation row by row, shift [m]")                \
-  FIELD(Scalar, given, 6, slots, "h x impulses of both ends, body frame at k; moment, force")            \
-  FIELD(Scalar, uneven, 6, slots, "h x impulses times s - 1/2, where they act at the end, likewise")     \
-  FIELD(Scalar, pull, 36, slots, "what K grows by, as a Mat6; zero of bodies that no effect touches")
+  FIELD(Scalar, applied, 6, slots, "h x impulses of both ends, body frame at k; moment, force")            \
+  FIELD(Scalar, start_excess, 6, slots, "h x impulses times s - 1/2, where they act at the end, likewise")     \
+  FIELD(Scalar, body_stiffness, 36, slots, "what K grows by, as a Mat6; zero of bodies that no effect touches")
 
 template <class Scalar>
 struct BodyImpulses {
@@ -36,8 +36,8 @@ struct BodyImpulses {
 
 template <class S>
 void clear_body(BodyImpulses<S>& sum, Index i) {
-  for (int k = 0; k < 6; ++k) sum.given(i, k) = sum.uneven(i, k) = S(0.0);
-  for (int k = 0; k < 36; ++k) sum.pull(i, k) = S(0.0);
+  for (int k = 0; k < 6; ++k) sum.applied(i, k) = sum.start_excess(i, k) = S(0.0);
+  for (int k = 0; k < 36; ++k) sum.body_stiffness(i, k) = S(0.0);
 }
 
 /// impulse_i -= wrench
@@ -46,13 +46,13 @@ LINDEN_INLINE void take_wrench(Field<S, 6>& impulse, Index i, const Wrench<S>& w
   store(impulse, i, load<Wrench, S>(impulse, i) - wrench);
 }
 
-/// h^2 x wrenches of the beginning and of both ends; uneven: (s - 1/2) x both, where it acts at the end of the step.
+/// h^2 x wrenches of the beginning and of both ends; start_excess: (s - 1/2) x both, where it acts at the end of the step.
 template <class S>
 LINDEN_INLINE void add_wrenches(BodyImpulses<S>& sum, Field<S, 6>& impulse, Index i, const Wrench<S>& begin, const Wrench<S>& both,
-                                const Wrench<S>& uneven) {
+                                const Wrench<S>& start_excess) {
   take_wrench(impulse, i, begin);
-  store(sum.given, i, load<Wrench, S>(sum.given, i) + both);
-  store(sum.uneven, i, load<Wrench, S>(sum.uneven, i) + uneven);
+  store(sum.applied, i, load<Wrench, S>(sum.applied, i) + both);
+  store(sum.start_excess, i, load<Wrench, S>(sum.start_excess, i) + start_excess);
 }
 
 /// force x h^2 at the point `arm`, which moves by `moved`.
@@ -71,7 +71,7 @@ LINDEN_INLINE void add_pull(BodyImpulses<S>& sum, Index i, const Vec3<S>& arm, c
   // columns (w, v): dD = R (v - c x w)
   const S minus(-1.0);
   const Mat6<S> more{minus * times_hat(ab, c), ab, minus * times_hat(bb, c), bb};
-  (Mat6<S>::from(sum.pull.row(i)) + more).to(sum.pull.row(i));
+  (Mat6<S>::from(sum.body_stiffness.row(i)) + more).to(sum.body_stiffness.row(i));
 }
 
 /// Impulses of the beginning become those of the end, but for being seen from the new poses. Leaves `given` at zero.

@@ -7,7 +7,7 @@
 // to rest at any c. Of a ball joint delta is the logarithm of its displacement: a torque against its mean angular velocity.
 //
 // units   c [N m s/rad, N s/m]
-// energy  takes c delta worked / h a step
+// energy  takes c delta work_displacement / h a step
 // cost    some 2 operations an entry and step
 // source  discrete d'Alembert principle: Marsden, West, Discrete mechanics and variational integrators (2001), 3.2
 #pragma once
@@ -33,7 +33,7 @@ void damping_loss(std::span<const JointDamping> dampers, std::span<const double>
                   const Field<S>& before, const Each& each) {
   for (std::size_t k = 0; k < dampers.size(); ++k) {
     const Index row = dampers[k].row;
-    each(row, as<S>(dampers[k].coefficient) * delta(row) * worked(share[k], delta(row), before(row)) / h);
+    each(row, as<S>(dampers[k].coefficient) * delta(row) * work_displacement(share[k], delta(row), before(row)) / h);
   }
 }
 

@@ -32,7 +32,7 @@ class DeadZoneSpringLaw : public JointLaw<S, DeadZoneSpring> {
   static constexpr std::array sweeps{
       PartSweep{Part::begin, "begin_dead_zones", "dead zones, q, delta", "dead zones"},
       PartSweep{Part::add, "dead_zone_map", "dead zones, q, joint impulses", "joint impulses"},
-      PartSweep{Part::revise, "revise_dead_zones", "dead zones, q, delta", "dead zones"}};
+      PartSweep{Part::update_states, "update_dead_zones", "dead zones, q, delta", "dead zones"}};
   static constexpr bool kFollows = true;
   explicit DeadZoneSpringLaw(const LawSetup& setup) : JointLaw<S, DeadZoneSpring>(setup) {
     mode_.allocate(static_cast<Index>(this->entries().size()));
@@ -49,7 +49,7 @@ class DeadZoneSpringLaw : public JointLaw<S, DeadZoneSpring> {
       add_impulse(sum, spring.row, 0.5, select(within, zero, pull * beyond), select(within, zero, half * pull));
     }
   }
-  MaskOf<S> revise(const StepView<S>& step, const Revision<MaskOf<S>>&, const S&, const Field<S>&, Field<S>& delta) {
+  MaskOf<S> update_states(const StepView<S>& step, const StateUpdate<MaskOf<S>>&, const S&, const Field<S>&, Field<S>& delta) {
     return find_pieces(step, delta);
   }
   void follow(const StepView<S>& step, const Field<S>& delta) { find_pieces(step, delta); }

@@ -5,17 +5,17 @@
 //   holds  (mode = 0)               delta = 0 exactly, as long as |impulse that holds| <= h f
 //
 // No penalty and no creep: a joint that holds is taken out of the solve (joint_impulses.hpp), and what is left of the residual in its
-// row is h times the impulse that holds it. Modes are revised within the solve until they are those of the solution (semismooth Newton,
+// row is h times the impulse that holds it. Modes are updated within the solve until they are those of the solution (semismooth Newton,
 // the same as an active set): a sliding joint that would turn back holds, one that holds more than friction can starts to slide.
 //
-// Softly (creep > 0) it is f delta / (h creep) where |delta| < h creep, by the value of delta alone: what the solver goes by where sudden
+// Regularised (stiction_speed v > 0) it is f delta / (h v) where |delta| < h v, by the value of delta alone: what the solver goes by where sudden
 // revisions of many joints go round in circles. Its solution says which joints hold.
 //
 // The solution minimises the kinetic energy of the step plus f |delta|, so there is just one, and friction never gives energy. Taking
 // the whole impulse at the beginning shifts it by half a step: first order in h while sliding.
 //
 // units   f [N m, N]
-// energy  takes force x worked a step
+// energy  takes force x work_displacement a step
 // cost    some 4 operations an entry and evaluation
 // source  Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988); Hintermueller, Ito, Kunisch, The primal-dual
 //         active set strategy as a semismooth Newton method (2002)
@@ -40,11 +40,11 @@ LINDEN_INLINE S sign_of(const S& x) {
   return select(x > zero, one, select(x < zero, -one, zero));
 }
 
-/// The modes that delta alone suggests; displacements below h creep hold.
+/// The modes that delta alone suggests; displacements below h stiction_speed hold.
 template <class S>
-void guess_friction(Frictions<S>& frictions, const S& h, double creep, const Field<S>& delta) {
+void guess_friction(Frictions<S>& frictions, const S& h, double stiction_speed, const Field<S>& delta) {
   using std::abs;
-  const S still = h * as<S>(creep);
+  const S still = h * as<S>(stiction_speed);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
     const S& d = delta(frictions.entries[static_cast<std::size_t>(k)].row);
     frictions.mode(k) = select(abs(d) <= still, S(0.0), sign_of(d));
@@ -63,7 +63,7 @@ void begin_friction(Frictions<S>& frictions, const Field<S>& before, const Mask&
   }
 }
 
-/// Displacements of joints that hold softly, for a creep that is smaller by a factor: their forces stay.
+/// Displacements of joints that hold softly, for a stiction_speed that is smaller by a factor: their forces stay.
 template <class S>
 void shrink_friction(const Frictions<S>& frictions, double factor, Field<S>& delta) {
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
@@ -73,11 +73,11 @@ void shrink_friction(const Frictions<S>& frictions, double factor, Field<S>& del
 }
 
 template <class S>
-void friction_map(const Frictions<S>& frictions, const S& h, double creep, JointImpulses<S>& sum) {
+void friction_map(const Frictions<S>& frictions, const S& h, double stiction_speed, JointImpulses<S>& sum) {
   const S zero(0.0);
   for (Index k = 0; k < frictions.mode.rows(); ++k) {
     const S f = h * frictions.force(k);
-    const S soft = creep > 0 ? select(frictions.mode(k) == zero, f / as<S>(creep), zero) : zero;
+    const S soft = stiction_speed > 0 ? select(frictions.mode(k) == zero, f / as<S>(stiction_speed), zero) : zero;
     add_impulse(sum, frictions.entries[static_cast<std::size_t>(k)].row, 1, frictions.mode(k) * (h * f), soft);
   }
 }
@@ -110,7 +110,7 @@ S friction_overload(const Frictions<S>& frictions, const S& h, const Field<S>& r
 /// The modes that belong to delta, which is set to zero where a joint comes to hold; where `settled`, joints that hold more than `least`
 /// times what friction can start to slide. Returns in which instances one changed.
 template <class S, class Mask>
-auto revise_friction(Frictions<S>& frictions, const S& h, const Field<S>& residual, const Mask& settled, const S& least,
+auto update_friction(Frictions<S>& frictions, const S& h, const Field<S>& residual, const Mask& settled, const S& least,
                      Field<S>& delta) {
   const S zero(0.0);
   auto changed = zero > S(1.0);
@@ -138,7 +138,7 @@ void friction_loss(const Frictions<S>& frictions, const S& h, const Field<S>& re
     const JointFriction& friction = frictions.entries[static_cast<std::size_t>(k)];
     const S held = -residual(friction.row) / (h * h), sliding = frictions.force(k) * frictions.mode(k);
     const S force = select(frictions.mode(k) == S(0.0), held, sliding);
-    each(friction.row, force * worked(1.0, delta(friction.row), before(friction.row)));
+    each(friction.row, force * work_displacement(1.0, delta(friction.row), before(friction.row)));
   }
 }
 
@@ -147,7 +147,7 @@ class FrictionLaw : public JointLaw<S, JointFriction> {
  public:
   static constexpr std::array sweeps{PartSweep{Part::begin, "begin_friction", "before, delta", "friction, delta"},
                                      PartSweep{Part::add, "friction_map", "friction, joint impulses", "joint impulses"},
-                                     PartSweep{Part::revise, "revise_friction", "residual, delta", "friction, delta"}};
+                                     PartSweep{Part::update_states, "update_friction", "residual, delta", "friction, delta"}};
   static constexpr bool kFollows = true;
   explicit FrictionLaw(const LawSetup& setup) : JointLaw<S, JointFriction>(setup) {
     frictions_.entries = this->entries();
@@ -159,15 +159,16 @@ class FrictionLaw : public JointLaw<S, JointFriction> {
     begin_friction(frictions_, start.before, start.known, delta);
   }
   void add(const StepView<S>& step, JointImpulses<S>& sum) const {
-    friction_map(frictions_, step.h, step.creep, sum);
-    if (step.creep == 0) hold_friction(frictions_, sum);
+    friction_map(frictions_, step.h, step.stiction_speed, sum);
+    if (step.stiction_speed == 0) hold_friction(frictions_, sum);
   }
   S overload(const StepView<S>& step, const Field<S>& residual) const { return friction_overload(frictions_, step.h, residual); }
-  MaskOf<S> revise(const StepView<S>& step, const Revision<MaskOf<S>>& now, const S& least, const Field<S>& residual, Field<S>& delta) {
-    return revise_friction(frictions_, step.h, residual, now.near, least, delta);
+  MaskOf<S> update_states(const StepView<S>& step, const StateUpdate<MaskOf<S>>& now, const S& least, const Field<S>& residual,
+                          Field<S>& delta) {
+    return update_friction(frictions_, step.h, residual, now.near, least, delta);
   }
-  void follow(const StepView<S>& step, const Field<S>& delta) { guess_friction(frictions_, step.h, step.creep, delta); }
-  void soften(double factor, Field<S>& delta) const { shrink_friction(frictions_, factor, delta); }
+  void follow(const StepView<S>& step, const Field<S>& delta) { guess_friction(frictions_, step.h, step.stiction_speed, delta); }
+  void regularize(double factor, Field<S>& delta) const { shrink_friction(frictions_, factor, delta); }
   void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
     friction_loss(frictions_, step.h, solved.residual, solved.delta, solved.before, book);
   }

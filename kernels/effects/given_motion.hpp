@@ -8,8 +8,8 @@
 // joint has the velocity with which its curve comes there, and the others' are read beside it.
 //
 // units   g, delta [rad, m]; residual [kg m^2, kg m]
-// energy  gives residual x worked / h^2. Velocities at the end of a step have seen half of the next impulse, too: h/2 v force, of the
-//         force that lasted from step to step, which no blow has. The first step's impulse is half of one: it has half a step behind it.
+// energy  gives residual x work_displacement / h^2. Velocities at the end of a step have seen half of the next impulse, too: h/2 v force,
+//         of the force that lasted from step to step, which no blow has. The first step's impulse is half of one: it has half a step behind it.
 // cost    two looks into a table an entry and step
 // source  constraints of a discrete Euler-Lagrange equation: Marsden, West, Discrete mechanics and variational integrators (2001), 3.4
 #pragma once
@@ -57,7 +57,7 @@ void hold_motions(const GivenMotions<S>& motions, JointImpulses<S>& sum) {
 /// Of a force what lasted.
 template <class S>
 S steady_force(const GivenMotions<S>& motions, Index k, const S& force) {
-  return select(motions.first > S(0.5), force, lasting(force, motions.force(k)));
+  return select(motions.first > S(0.5), force, persistent(force, motions.force(k)));
 }
 
 /// After a step: what it took, and where its end is.
@@ -78,7 +78,7 @@ S motion_work(const GivenMotions<S>& motions, const S& h, const Field<S>& residu
   for (Index k = 0; k < motions.end.rows(); ++k) {
     const Index row = motions.row(k);
     const S steady = steady_force(motions, k, motions.per_force * residual(row));
-    sum = sum + residual(row) * worked(1.0, delta(row), before(row)) / (h * h);
+    sum = sum + residual(row) * work_displacement(1.0, delta(row), before(row)) / (h * h);
     sum = sum + S(0.5) * h * (steady * motions.next_velocity(k) - motions.steady(k) * motions.velocity(k));
   }
   return sum;

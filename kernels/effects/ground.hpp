@@ -2,7 +2,7 @@
 // Ground: compliant in its normal direction, Coulomb friction along it. A force at each contact, body-local, hence inside the O(n) solve.
 //
 //   normal    N = max(0, -(P(gap^k+1) - P(gap^k)) / rise - c' (m^k+1 - m^k) / h),    m = min(gap, 0),  P = 1/2 k m^2
-//   sticks    F_t = -b t                         as long as |F_t| <= friction N,    b = friction max(k depth^k, N_least) / (h creep)
+//   sticks    F_t = -b t                         as long as |F_t| <= friction N,    b = friction max(k depth^k, N_least) / (h kCreep)
 //   slides    F_t = -friction N t / |t|          as long as t does not turn back
 //
 // Gaps are of shapes (kernels/effects/contact_geometry.hpp), rise = gap^k+1 - gap^k, and N acts along the wrench whose work is N rise. The difference
@@ -22,8 +22,8 @@
 //
 // What sticks creeps by some kCreep at the limit of its friction and by less below it, the points of a foot in proportion to the load
 // that each bore at the beginning of the step. That is stiff, so it is taken by backward Euler (share 1), the normal force with the
-// share s that its stiffness calls for (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are revised
-// within the solve until they are those of the solution. Softly (creep > 0), as in friction.hpp: F_t = -friction N t / max(|t|, h creep).
+// share s that its stiffness calls for (joint_impulses.hpp). Stick and slide are an active set, as in friction.hpp: they are updated
+// within the solve until they are those of the solution. Regularised (stiction_speed v > 0), as in friction.hpp: F_t = -friction N t / max(|t|, h v).
 //
 // A rim stands as four points: the lowest of its circle, the highest, and the two between, whose gap is the centre's. Lowest and highest
 // together are as stiff against a tilt of a disc that lies flat as springs all around it. What a rim loses (c') it loses by what its material
@@ -74,7 +74,7 @@ void guess_ground(const GroundPlan& plan, const S& h, bool known, const Field<S,
 
 /// Points first ... last - 1, all of one body. mu: Coulomb's coefficient, of each instance its own.
 template <class S>
-void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& mu, const S& h, double creep,
+void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& mu, const S& h, double stiction_speed,
                 const Field<S, 7>& displacement, GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
   if (first == last) return;
   using std::max;
@@ -117,7 +117,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const S stiff = weight * as<S>(ground.stiffness), loss = weight * (rate * as<S>(ground.damping)) + (share - half) * stiff;
     const NormalForce<S> normal = normal_force(stiff, loss, gap, meeting.gap.rise, meeting.slip.rise);
     S slides = points.slides(k);
-    const FrictionForce<S> friction = friction_force(plan, mu, h, creep, gap, normal, meeting.slip.along, slides);
+    const FrictionForce<S> friction = friction_force(plan, mu, h, stiction_speed, gap, normal, meeting.slip.along, slides);
     points.slides(k) = slides;
 
     const Vec3<S> a = c + meeting.arm, &n = meeting.normal;
@@ -169,7 +169,7 @@ S ground_overload(const GroundPoints<S>& points) {
 /// The states that belong to the evaluation last made. Where `settled`, points that stick with more than `least` times what friction can
 /// give start to slide. Returns in which instances one changed, or where the ground starts or ceases to push.
 template <class S, class Mask>
-auto revise_ground(GroundPoints<S>& points, const Mask& settled, const S& least) {
+auto update_ground(GroundPoints<S>& points, const Mask& settled, const S& least) {
   const S zero(0.0), one(1.0);
   auto changed = zero > one;
   for (Index k = 0; k < points.slides.rows(); ++k) {
@@ -190,8 +190,9 @@ void ground_work(const GroundPlan& plan, bool known, const GroundPoints<S>& poin
   for (Index k = 0; k < points.push.rows(); ++k) {
     const S rise = points.rise(k), rise_before = known ? points.rise_before(k) : rise;
     const auto t = load<Vec3, S>(points.slip, k), t_before = known ? load<Vec3, S>(points.slip_last, k) : t;
-    each(plan.points[static_cast<std::size_t>(k)].slot, points.push(k) * worked(plan.share[static_cast<std::size_t>(k)], rise, rise_before) +
-                                                            S(0.5) * dot(load<Vec3, S>(points.drag, k), t + t_before));
+    const S along_normal = work_displacement(plan.share[static_cast<std::size_t>(k)], rise, rise_before);
+    each(plan.points[static_cast<std::size_t>(k)].slot,
+         points.push(k) * along_normal + S(0.5) * dot(load<Vec3, S>(points.drag, k), t + t_before));
   }
 }
 

@@ -161,15 +161,15 @@ struct FrictionForce {
 
 /// `slides` is set where friction is smooth.
 template <class S>
-FrictionForce<S> friction_force(const GroundPlan& plan, const S& mu, const S& h, double creep, const S& gap, const NormalForce<S>& normal, const Vec3<S>& t,
-                                S& slides) {
+FrictionForce<S> friction_force(const GroundPlan& plan, const S& mu, const S& h, double stiction_speed, const S& gap,
+                                const NormalForce<S>& normal, const Vec3<S>& t, S& slides) {
   using std::max;
   using std::sqrt;
   const S zero(0.0), one(1.0), N = normal.push();
   const S length = sqrt(dot(t, t));
-  if (creep > 0) slides = select(length > h * as<S>(creep), one, zero);
-  const auto closed = normal.closed > zero, sliding = slides > zero, by_load = sliding || as<S>(creep) > zero;
-  const S per_length = creep > 0 ? one / max(length, h * as<S>(creep)) : select(length > zero, one / length, zero);
+  if (stiction_speed > 0) slides = select(length > h * as<S>(stiction_speed), one, zero);
+  const auto closed = normal.closed > zero, sliding = slides > zero, by_load = sliding || as<S>(stiction_speed) > zero;
+  const S per_length = stiction_speed > 0 ? one / max(length, h * as<S>(stiction_speed)) : select(length > zero, one / length, zero);
   const S stick = mu / (h * as<S>(kCreep));
   const S stuck = stick * max(as<S>(-plan.ground.stiffness) * gap, as<S>(plan.least_load));
   const S b = select(closed, select(by_load, mu * N * per_length, stuck), zero);
@@ -224,7 +224,7 @@ LINDEN_INLINE void add_jacobian(const GroundPoint& point, const S& scale, const 
     ba = ba - (Ho - S(0.5) * times_hat(Ho, body.turn)) * R;
   }
   K = K + Mat6<S>{hat_times(a, ba), hat_times(a, bb), ba, bb};
-  (Mat6<S>::from(sum.pull.row(i)) + K).to(sum.pull.row(i));
+  (Mat6<S>::from(sum.body_stiffness.row(i)) + K).to(sum.body_stiffness.row(i));
 }
 
 }  // namespace linden

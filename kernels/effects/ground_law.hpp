@@ -14,7 +14,7 @@ class GroundLaw : public BodyLaw<S, Ground> {
       PartSweep{Part::begin, "begin_ground", "points", "points"},
       PartSweep{Part::guess, "guess_ground", "points, displacement", "points"},
       PartSweep{Part::add, "ground_map", "points, displacement, impulse, body impulses", "points, impulse, body impulses"},
-      PartSweep{Part::revise, "revise_ground", "points", "points"},
+      PartSweep{Part::update_states, "update_ground", "points", "points"},
       PartSweep{Part::keep, "keep_ground", "points", "points"},
       PartSweep{Part::place, "find_ground", "pose", "points"}};
   explicit GroundLaw(const LawSetup& setup) : BodyLaw<S, Ground>(setup), plan_(setup.ground), friction_(as<S>(setup.ground.ground.friction)) {
@@ -33,11 +33,11 @@ class GroundLaw : public BodyLaw<S, Ground> {
   template <class Element>
   void add(const StepView<S>& step, const BodyConstants<Element>&, std::size_t first, std::size_t last, const Field<S, 7>& displacement,
            BodyImpulses<S>& sum, Field<S, 6>& impulse) {
-    ground_map(plan_, first, last, friction_, step.h, step.creep, displacement, points_, sum, impulse);
+    ground_map(plan_, first, last, friction_, step.h, step.stiction_speed, displacement, points_, sum, impulse);
   }
   S overload(const StepView<S>&, const Field<S>&) const { return ground_overload(points_); }
-  MaskOf<S> revise(const StepView<S>&, const Revision<MaskOf<S>>& now, const S& least, const Field<S>&, Field<S>&) {
-    return revise_ground(points_, now.near, least);
+  MaskOf<S> update_states(const StepView<S>&, const StateUpdate<MaskOf<S>>& now, const S& least, const Field<S>&, Field<S>&) {
+    return update_ground(points_, now.near, least);
   }
   void account(const StepView<S>&, const SolvedStep<S>& solved, const auto& book) const {
     ground_work(plan_, solved.known, points_, [&](Index slot, double given) { book(slot, -given); });

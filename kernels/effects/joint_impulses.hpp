@@ -12,8 +12,8 @@
 // from where the impulse of a step is as large as the inertia it acts on.
 //
 // Work: what acts at the beginning meets the velocities before it and after it, what acts at the end those of this step and the next. An
-// impulse with share s therefore works along  worked = delta - (s - 1/2) (delta - before),  before = displacement of the step before:
-// summed over steps this is the kinetic energy it gives, an impact's too.
+// impulse with share s therefore works along  work_displacement = delta - (s - 1/2) (delta - before),  before = displacement of the step
+// before: summed over steps this is the kinetic energy it gives, an impact's too.
 //
 // reads   target nv as momentum_target_map left it (plain_target), delta nv
 // writes  momentum_target nv; p nv
@@ -78,13 +78,13 @@ void joint_impulses_map(const JointImpulses<S>& sum, const Field<S>& delta, Fiel
 
 /// Displacement that an impulse works along; share: a number, or one of each instance.
 template <class Share, class S>
-LINDEN_INLINE S worked(const Share& share, const S& delta, const S& before) {
+LINDEN_INLINE S work_displacement(const Share& share, const S& delta, const S& before) {
   return delta - as<S>(share - Share(0.5)) * (delta - before);
 }
 
 /// The smaller of two numbers of one sign, else zero: of an impulse, what lasted from step to step, without what an impact gave.
 template <class S>
-LINDEN_INLINE S lasting(const S& a, const S& b) {
+LINDEN_INLINE S persistent(const S& a, const S& b) {
   using std::abs;
   using std::min;
   const S zero(0.0);

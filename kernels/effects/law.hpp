@@ -7,7 +7,7 @@
 //   add         rows: impulses affine in the displacement (joint_impulses.hpp)     joints: when a step begins and when a state changed
 //               or forces at points of bodies (body_impulses.hpp)                  bodies: once an evaluation
 //   evaluate    of a joint: what is not affine in the displacement                 once an evaluation
-//   revise      states that belong to the solution so far: did one change?         once an evaluation
+//   update_states      states that belong to the solution so far: did one change?         once an evaluation
 //   account     energy that it took or gave
 //   end         of a joint: what p gets at the end beside its rows
 //   keep        what is kept for the next step
@@ -49,7 +49,7 @@ struct JointsView {
 template <class S>
 struct StepView : JointsView<S> {
   S h;           // [s]
-  double creep;  // above zero: friction is smooth up to this speed [rad/s, m/s]
+  double stiction_speed;  // above zero: friction is smooth up to this speed [rad/s, m/s]
 };
 
 /// What is known when a step begins.
@@ -62,10 +62,10 @@ struct StepStart {
   bool passable;              // limits that joints bounce off: limits.hpp
 };
 
-/// How far a solve is when states are revised: its residual is small; it is solved; it has been revised so often that of what sticks too
+/// How far a solve is when states are updated: its residual is small; it is solved; it has been updated so often that of what sticks too
 /// hard one alone begins to slide; and so often that of limits too one alone changes.
 template <class Mask>
-struct Revision {
+struct StateUpdate {
   Mask near, solved, late, last;
 };
 
@@ -96,7 +96,7 @@ struct BodiesInstant {
 };
 
 /// Which part of a law a sweep is.
-enum class Part : std::uint8_t { place, begin, guess, add, evaluate, revise, keep };
+enum class Part : std::uint8_t { place, begin, guess, add, evaluate, update_states, keep };
 
 /// A part as the schedule of a step has it (engine/sweeps/schedule.hpp): its kernel's name, and arrays by their names. Every part that a law
 /// has written anew is named among its `sweeps`, but for `end` and a joint's `keep`, which are parts of joint_impulses_end_map. `residual` is
@@ -130,7 +130,7 @@ class LawOf {
   bool any() const { return !entries_.empty(); }
 
   // states
-  /// Of what holds, the most that any has to bear as a share of what it can; only of what can be revised one by one.
+  /// Of what holds, the most that any has to bear as a share of what it can; only of what can be updated one by one.
   S overload(const StepView<S>&, const Field<S>&) const { return S(0.0); }
 
   // what is kept from one step to the next
@@ -155,7 +155,7 @@ class LawOf {
 ///   void add(const StepView<S>&, JointImpulses<S>&) const;
 /// and, as its facts demand,
 ///   static S potential(const Entry&, const JointsView<S>&);                                           .stores
-///   MaskOf<S> revise(const StepView<S>&, const Revision<MaskOf<S>>&, const S& least,
+///   MaskOf<S> update_states(const StepView<S>&, const StateUpdate<MaskOf<S>>&, const S& least,
 ///                    const Field<S>& residual, Field<S>& delta);                                       .has_states
 ///   void account(const StepView<S>&, const SolvedStep<S>&, const auto& book) const;  book(row, joules) .account
 ///   static void push(const Entry&, const Instant&, Field<double>& force);                              unless all of it is .sudden
@@ -175,11 +175,11 @@ class JointLaw : public LawOf<S, E> {
   void end(const StepView<S>&, const Field<S, 7>& /*motion*/, Field<S>& /*end*/) const {}
   /// After that, for the next step.
   void keep(const Field<S>& /*residual*/) {}
-  /// Where states go by delta alone as long as friction is smooth, it is `follow` that sets them; `revise` is not asked then.
+  /// Where states go by delta alone as long as friction is smooth, it is `follow` that sets them; `update_states` is not asked then.
   static constexpr bool kFollows = false;
   void follow(const StepView<S>&, const Field<S>& /*delta*/) {}
   /// Friction is now smooth up to a speed that is smaller by this factor.
-  void soften(double /*factor*/, Field<S>& /*delta*/) const {}
+  void regularize(double /*factor*/, Field<S>& /*delta*/) const {}
 };
 
 /// A law of bodies. Besides what stands here it has
@@ -187,7 +187,8 @@ class JointLaw : public LawOf<S, E> {
 ///   static std::span<const ...> touching(const LawSetup&);      what it has on bodies, sorted by their slots
 ///   void add(const StepView<S>&, const BodyConstants<...>&, std::size_t first, std::size_t last, const Field<S, 7>& displacement,
 ///            BodyImpulses<S>&, Field<S, 6>& impulse);           of [first, last) of these, all on one body
-/// and what its facts demand: S place(const Field<S, 12>& pose) where it .stores, revise and account as a law of joints; book(slot, joules); and
+/// and what its facts demand: S place(const Field<S, 12>& pose) where it .stores, update_states and account as a law of joints;
+/// book(slot, joules); and
 ///   static void push(const Entry&, const BodiesInstant&, Field<double, 6>& impulse);                   unless all of it is .sudden
 /// which, like `add`, takes what acts on a body, moment about its origin and force in its frame, from what is there (take_wrench). It may have a
 /// ratio, of a body's mass.

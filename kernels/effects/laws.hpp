@@ -101,9 +101,9 @@ consteval void require_parts() {
                 "the law's entries have no list: name it in LINDEN_EFFECT_LISTS, layout/effects.hpp");
   static_assert(requires { Law::sweeps.size(); }, "the law does not say what its parts are called: give it `sweeps`, as in law.hpp");
   if constexpr (facts.has_states) {
-    static_assert(requires(Law& law, const StepView<S>& step, const Revision<MaskOf<S>>& now, const S& least, const Field<S>& r, Field<S>& d) {
-      { law.revise(step, now, least, r, d) } -> std::same_as<MaskOf<S>>;
-    }, "the facts say that the effect has states: give its law `revise`, as in law.hpp");
+    static_assert(requires(Law& law, const StepView<S>& step, const StateUpdate<MaskOf<S>>& now, const S& least, const Field<S>& r, Field<S>& d) {
+      { law.update_states(step, now, least, r, d) } -> std::same_as<MaskOf<S>>;
+    }, "the facts say that the effect has states: give its law `update_states`, as in law.hpp");
   }
   if constexpr (facts.account != Account::none) {
     static_assert(requires(const Law& law, const StepView<S>& step, const SolvedStep<S>& solved) { law.account(step, solved, NoBook{}); },

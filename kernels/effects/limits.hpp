@@ -17,7 +17,7 @@
 //   v_n <- -e v_n,   p <- p - (1 + e) v_n / (M^-1)_nn  in the joint's row          Newton's law of impact
 //
 // units   [rad, m]; e without
-// energy  takes -impulse x worked / h; a blow 1/2 (1 - e^2) v_n^2 / (M^-1)_nn
+// energy  takes -impulse x work_displacement / h; a blow 1/2 (1 - e^2) v_n^2 / (M^-1)_nn
 // cost    some 8 operations an entry and evaluation
 // source  Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988)
 #pragma once
@@ -86,11 +86,11 @@ void hold_limits(const Limits<S>& limits, JointImpulses<S>& sum) {
   }
 }
 
-/// As revise_friction: joints that pass a limit are put on it; where `settled`, those that it would have to pull are let go. All at once
-/// is quick but may go round in circles; `one_by_one` the last of the settled alone changes, which never does (Murty's rule: Note on a
-/// Bard-type scheme for solving the complementarity problem (1974)).
+/// As update_friction: joints that pass a limit are put on it; where `settled`, those that it would have to pull are let go. All at once
+/// is quick but may go round in circles; `one_switch_at_a_time` the last of the settled alone changes, which never does (Murty's rule: Note
+/// on a Bard-type scheme for solving the complementarity problem (1974)).
 template <class S, class Mask>
-auto revise_limits(Limits<S>& limits, const Field<S>& residual, const Mask& settled, const Mask& one_by_one, Field<S>& delta) {
+auto update_limits(Limits<S>& limits, const Field<S>& residual, const Mask& settled, const Mask& one_switch_at_a_time, Field<S>& delta) {
   const S zero(0.0), one(1.0);
   auto changed = zero > one;
   for (Index k = limits.mode.rows() - 1; k >= 0; --k) {
@@ -99,7 +99,7 @@ auto revise_limits(Limits<S>& limits, const Field<S>& residual, const Mask& sett
     const S& mode = limits.mode(k);
     const auto open = mode == zero;
     // a residual above zero is taken away by a smaller delta: the joint leaves an upper limit by itself
-    const auto may = !(one_by_one && (changed || !settled));
+    const auto may = !(one_switch_at_a_time && (changed || !settled));
     const auto leaves = may && !open && settled && mode * residual(row) > zero;
     const auto above = may && open && d > limits.highest(k), below = may && open && d < limits.lowest(k);
     d = select(above, limits.highest(k), select(below, limits.lowest(k), d));
@@ -133,7 +133,7 @@ template <class S, class Each>
 void limit_loss(const Limits<S>& limits, const S& h, const Field<S>& residual, const Field<S>& delta, const Field<S>& before, const Each& each) {
   for (Index k = 0; k < limits.mode.rows(); ++k) {
     const Index row = limits.entries[static_cast<std::size_t>(k)].row;
-    each(row, select(limits.mode(k) != S(0.0), -residual(row) * worked(1.0, delta(row), before(row)) / (h * h), S(0.0)));
+    each(row, select(limits.mode(k) != S(0.0), -residual(row) * work_displacement(1.0, delta(row), before(row)) / (h * h), S(0.0)));
   }
 }
 
@@ -142,7 +142,7 @@ class LimitsLaw : public JointLaw<S, JointLimit> {
  public:
   static constexpr std::array sweeps{PartSweep{Part::begin, "begin_limits", "q, before, delta", "limits, delta"},
                                      PartSweep{Part::add, "hold_limits", "limits, joint impulses", "joint impulses"},
-                                     PartSweep{Part::revise, "revise_limits", "residual, delta", "limits, delta"}};
+                                     PartSweep{Part::update_states, "update_limits", "residual, delta", "limits, delta"}};
   explicit LimitsLaw(const LawSetup& setup) : JointLaw<S, JointLimit>(setup) {
     limits_.entries = this->entries();
     for (Field<S>* field : {&limits_.lowest, &limits_.highest, &limits_.mode}) field->allocate(static_cast<Index>(this->entries().size()));
@@ -153,8 +153,8 @@ class LimitsLaw : public JointLaw<S, JointLimit> {
   }
   void add(const StepView<S>&, JointImpulses<S>& sum) const { hold_limits(limits_, sum); }
   /// Limits that do not settle soon are judged at the solution: nearby, what holds a light joint is lost in what the others still lack.
-  MaskOf<S> revise(const StepView<S>&, const Revision<MaskOf<S>>& now, const S&, const Field<S>& residual, Field<S>& delta) {
-    return revise_limits(limits_, residual, now.solved || (now.near && !now.late), now.last, delta);
+  MaskOf<S> update_states(const StepView<S>&, const StateUpdate<MaskOf<S>>& now, const S&, const Field<S>& residual, Field<S>& delta) {
+    return update_limits(limits_, residual, now.solved || (now.near && !now.late), now.last, delta);
   }
   void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
     limit_loss(limits_, step.h, solved.residual, solved.delta, solved.before, book);

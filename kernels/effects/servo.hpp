@@ -11,13 +11,13 @@
 // of the time q is taken at, t + s h, as the mean of [t + (2 s - 1) h, t + h]: of the whole step where s = 1/2, of its end where the servo
 // holds the joint fast, and never of what is yet to come.
 //
-// Which of the two holds is settled within the solve: `mode` is 0, 1 or -1 (at the limit, pushing up or down) and is revised until it is
+// Which of the two holds is settled within the solve: `mode` is 0, 1 or -1 (at the limit, pushing up or down) and is updated until it is
 // that of the solution.
 //
 // k, c and s are each instance's own: gains may differ from one to the next.
 //
 // units   k [N m/rad, N/m], c [N m s/rad, N s/m], most [N m, N]
-// energy  work of the force: force x worked a step, given or taken
+// energy  work of the force: force x work_displacement a step, given or taken
 // cost    some 6 operations an entry and step, 3 an evaluation
 #pragma once
 
@@ -68,7 +68,7 @@ void servo_map(const Servos<S>& servos, const Field<Index>& q_row, const S& h, c
 
 /// The modes that belong to delta. Returns in which instances one changed.
 template <class S>
-auto revise_servos(Servos<S>& servos, const Field<Index>& q_row, const S& h, const Field<S>& q, const Field<S>& delta) {
+auto update_servos(Servos<S>& servos, const Field<Index>& q_row, const S& h, const Field<S>& q, const Field<S>& delta) {
   const S zero(0.0), one(1.0);
   auto changed = zero > one;
   for (Index k = 0; k < servos.mode.rows(); ++k) {
@@ -91,7 +91,7 @@ S servo_work(const Servos<S>& servos, const Field<Index>& q_row, const S& h, con
     const auto [o, g, most] = servo_force(servos, k, q_row, h, q);
     const Index row = servos.entries[static_cast<std::size_t>(k)].row;
     const S& d = delta(row);
-    sum = sum + select(servos.mode(k) == zero, -(o + g * d), servos.mode(k) * most) * worked(servos.share(k), d, before(row));
+    sum = sum + select(servos.mode(k) == zero, -(o + g * d), servos.mode(k) * most) * work_displacement(servos.share(k), d, before(row));
   }
   return sum / (h * h);
 }
@@ -101,7 +101,7 @@ class ServoLaw : public JointLaw<S, Servo> {
  public:
   static constexpr std::array sweeps{PartSweep{Part::begin, "begin_servos", "servos, time", "servos"},
                                      PartSweep{Part::add, "servo_map", "servos, q, joint impulses", "joint impulses"},
-                                     PartSweep{Part::revise, "revise_servos", "servos, q, delta", "servos"}};
+                                     PartSweep{Part::update_states, "update_servos", "servos, q, delta", "servos"}};
   static constexpr bool kFollows = true;
   explicit ServoLaw(const LawSetup& setup) : JointLaw<S, Servo>(setup) {
     servos_.entries = this->entries();
@@ -110,7 +110,7 @@ class ServoLaw : public JointLaw<S, Servo> {
                             &servos_.target, &targets_, &gains_}) {
       field->allocate(count);
     }
-    const auto acts = [](const Course& course) { return std::ranges::any_of(course.values, [](double value) { return value != 0; }); };
+    const auto acts = [](const TimeTable& table) { return std::ranges::any_of(table.values, [](double value) { return value != 0; }); };
     for (Index k = 0; k < count; ++k) {
       const Servo& servo = this->entries()[static_cast<std::size_t>(k)];
       has_tables_ = has_tables_ || servo.target_moves() || acts(servo.target_velocity) || acts(servo.feedforward);
@@ -129,10 +129,10 @@ class ServoLaw : public JointLaw<S, Servo> {
     std::fill(servos_.mode.flat().begin(), servos_.mode.flat().end(), S(0.0));
   }
   void add(const StepView<S>& step, JointImpulses<S>& sum) const { servo_map(servos_, step.q_row, step.h, step.q, sum); }
-  MaskOf<S> revise(const StepView<S>& step, const Revision<MaskOf<S>>&, const S&, const Field<S>&, Field<S>& delta) {
-    return revise_servos(servos_, step.q_row, step.h, step.q, delta);
+  MaskOf<S> update_states(const StepView<S>& step, const StateUpdate<MaskOf<S>>&, const S&, const Field<S>&, Field<S>& delta) {
+    return update_servos(servos_, step.q_row, step.h, step.q, delta);
   }
-  void follow(const StepView<S>& step, const Field<S>& delta) { revise_servos(servos_, step.q_row, step.h, step.q, delta); }
+  void follow(const StepView<S>& step, const Field<S>& delta) { update_servos(servos_, step.q_row, step.h, step.q, delta); }
   void account(const StepView<S>& step, const SolvedStep<S>& solved, const auto& book) const {
     book(-1, servo_work(servos_, step.q_row, step.h, step.q, solved.delta, solved.before));
   }

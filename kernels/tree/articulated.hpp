@@ -31,7 +31,7 @@ template <class S, bool Joints, bool Bodies>
 struct EffectsAdded {
   static constexpr bool to_joints = Joints, to_bodies = Bodies;
   const Field<S>& stiffness;
-  const Field<S, 36>& pull;
+  const Field<S, 36>& body_stiffness;
 };
 
 /// Values before this line go through memory to those after it. A 6 x 6 matrix and two placements do not fit in 32 registers, and

@@ -22,7 +22,7 @@ void articulated_inertia_up(const Tree& tree, const BodyConstants<Element>& cons
     const auto G = load<Inertia, S>(constants.inertia, i);
     const Mat3<S> C = hat(G.mc);
     Mat6<S> A{G.rotational(), C, transpose(C), diagonal(G.m)};
-    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.pull.row(i));
+    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.body_stiffness.row(i));
     A.to(articulated.row(i));
   }
   up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {

@@ -129,12 +129,12 @@ template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
       const Twist<S> twist = log(load<Displacement, S>(work.displacement, i));
       A = pose_derivative(G, twist, G * twist);
     }
-    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.pull.row(i));
+    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.body_stiffness.row(i));
     if (tree.is_leaf(i) == 0) A = A + Mat6<S>::from(work.articulated.row(i));
     A.to(work.articulated.row(i));
     spill_here();
-    S felt[36];
-    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, felt, added);
+    S reduced[36];
+    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, reduced, added);
     spill_here();
 
     const auto X = load<Placement, S>(work.placement, i);
@@ -142,9 +142,9 @@ template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
     if constexpr (joint != JointKind::free) {
       const auto X_pose = after_motion(joint, X, load_motion(joint, work.motion, i));
       if (tree.is_last_child(i) != 0) {
-        to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = value; });
+        to_parent(X, X_pose, reduced, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = value; });
       } else {
-        to_parent(X, X_pose, felt, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = above[at] + value; });
+        to_parent(X, X_pose, reduced, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = above[at] + value; });
       }
     } else if (tree.is_last_child(i) != 0) {
       for (int k = 0; k < 36; ++k) above[k] = S(0.0);

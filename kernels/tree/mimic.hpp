@@ -106,7 +106,7 @@ class MimicTies {
       stiffness_(member.row) = as<S>(kHold<S>);
     }
     if constexpr (Added::to_bodies) {
-      return {stiffness_, added.pull};
+      return {stiffness_, added.body_stiffness};
     } else {
       return {stiffness_, no_pull_};
     }

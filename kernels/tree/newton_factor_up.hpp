@@ -72,9 +72,9 @@ LINDEN_INLINE Rows6 pass_screw(const Tree& tree, const BodyConstants<double>& co
   double* const other = ByColumns ? gains.down.row(row) : gains.up.row(row);
   for (int k = 0; k < 6; ++k) other[k] = (inverse * across[k])[0];
   gains.inverse(tree.first_block(i)) = inverse[0];
-  Rows6 felt;
-  for (int k = 0; k < 6; ++k) felt.r[k] = A.r[k] - across[k] * gain;
-  return mixed(ByColumns ? X : X_pose, turned_over(mixed(ByColumns ? X_pose : X, felt)));
+  Rows6 reduced;
+  for (int k = 0; k < 6; ++k) reduced.r[k] = A.r[k] - across[k] * gain;
+  return mixed(ByColumns ? X : X_pose, turned_over(mixed(ByColumns ? X_pose : X, reduced)));
 }
 
 /// Ball and free joints, number by number.
@@ -82,10 +82,10 @@ template <JointKind Kind, class Added>
 LINDEN_INLINE Rows6 pass_joint(Joint<Kind> joint, const Tree& tree, const BodyConstants<double>& constants, Index i, bool by_columns,
                                const Rows6& A, const Placement<double>& X, const Placement<double>& X_pose,
                                const Gains<double>& gains, const Added& added) {
-  double numbers[36], felt[36], passed[36];
+  double numbers[36], reduced[36], passed[36];
   to_mat6(by_columns ? turned_over(A) : A, numbers);
-  eliminate_joint(joint, tree, constants, i, numbers, gains, felt, added);
-  to_parent(X, X_pose, felt, [&](int at, double value) LINDEN_INLINE_LAMBDA { passed[at] = value; });
+  eliminate_joint(joint, tree, constants, i, numbers, gains, reduced, added);
+  to_parent(X, X_pose, reduced, [&](int at, double value) LINDEN_INLINE_LAMBDA { passed[at] = value; });
   const Rows6 rows = rows_of(passed);
   return by_columns ? rows : turned_over(rows);  // the parent is held the other way
 }
@@ -100,15 +100,15 @@ void factor_same_level(const Tree& tree, const BodyConstants<double>& constants,
   const auto place = [](bool by_columns, int line, int k) LINDEN_INLINE_LAMBDA {
     return by_columns ? row_start(k) + column_start(line) : row_start(line) + column_start(k);
   };
-  BodyPack A[36], felt[36];
+  BodyPack A[36], reduced[36];
   const auto u = log(gather<Displacement>(bodies, displacement, slots.row(i)));
   const auto G = gather<Inertia>(bodies, constants.inertia, i);
   pose_derivative(G, u, G * u).to(A);
   spill_here();
   if constexpr (Added::to_bodies) {
-    BodyPack pull[36];
-    turning::rows_to_lanes<36>([&](int l) LINDEN_INLINE_LAMBDA { return added.pull.row(i + l); }, pull);
-    for (int k = 0; k < 36; ++k) A[k] = A[k] + pull[k];
+    BodyPack body_stiffness[36];
+    turning::rows_to_lanes<36>([&](int l) LINDEN_INLINE_LAMBDA { return added.body_stiffness.row(i + l); }, body_stiffness);
+    for (int k = 0; k < 36; ++k) A[k] = A[k] + body_stiffness[k];
   }
   if (const Index* const leaf = tree.is_leaf.row(i); !std::all_of(leaf, leaf + kBodies, [](Index flag) { return flag != 0; })) {
     const auto has_children = at_bodies(bodies, tree.is_leaf, i) < BodyPack(0.5);
@@ -122,11 +122,11 @@ void factor_same_level(const Tree& tree, const BodyConstants<double>& constants,
     }
   }
   spill_here();
-  eliminate_screw(bodies, tree, constants, i, A, gains, felt, added);
+  eliminate_screw(bodies, tree, constants, i, A, gains, reduced, added);
   spill_here();
   const auto X = gather<Placement>(bodies, placement, slots.row(i));
   const auto X_pose = after_motion(Joint<JointKind::screw>{}, X, gather<Displacement>(bodies, motion, slots.row(i)));
-  to_parent(X, X_pose, felt, [&](int at, const BodyPack& value) LINDEN_INLINE_LAMBDA { A[at] = value; });
+  to_parent(X, X_pose, reduced, [&](int at, const BodyPack& value) LINDEN_INLINE_LAMBDA { A[at] = value; });
   spill_here();
   alignas(kAlignment) double passed[kBodies * kRowNumbers];
   for (int line = 0; line < 6; ++line) {
@@ -168,8 +168,8 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
       for (int k = 0; k < 6; ++k) A.r[k] = load_row8(K + (i - tile) * kRowNumbers + 8 * k) + pending.r[k];
       const bool by_columns = tree.level(i) % 2 != 0;
       if constexpr (Added::to_bodies) {
-        const Rows6 pull = rows_of(added.pull.row(i));
-        const Rows6 turned = by_columns ? turned_over(pull) : pull;
+        const Rows6 body_stiffness = rows_of(added.body_stiffness.row(i));
+        const Rows6 turned = by_columns ? turned_over(body_stiffness) : body_stiffness;
         for (int k = 0; k < 6; ++k) A.r[k] += turned.r[k];
       }
       const auto X = load<Placement, double>(placement, slots.row(i));

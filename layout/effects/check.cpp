@@ -92,18 +92,18 @@ class Checker {
     not_negative("stiffness", entry.stiffness);
     not_negative("damping", entry.damping);
     finite("target", entry.target);
-    if (entry.target_moves() || !entry.target_over_time.values.empty()) require_course("target_over_time", entry.target_over_time);
-    require_course("target_velocity", entry.target_velocity);
-    require_course("feedforward", entry.feedforward);
+    if (entry.target_moves() || !entry.target_over_time.values.empty()) require_time_table("target_over_time", entry.target_over_time);
+    require_time_table("target_velocity", entry.target_velocity);
+    require_time_table("feedforward", entry.feedforward);
     if (!(entry.max_force >= 0)) fail(fmt::format("max_force is {}", entry.max_force), "zero or more", "infinity is no limit");
   }
   void look(const JointTorque& entry) const {
     require_screw(entry.row);
-    require_course("force", entry.force);
+    require_time_table("force", entry.force);
   }
   void look(const JointMotion& entry) const {
     require_screw(entry.row);
-    require_course("position", entry.position);
+    require_time_table("position", entry.position);
     const auto twice = std::ranges::adjacent_find(entry.position.times);
     if (twice != entry.position.times.end())
       fail(fmt::format("{} is at two places at {} s", row_text(model_, entry.row), *twice), "one position a time", "leave one out");
@@ -123,7 +123,7 @@ class Checker {
     }
     if (!(entry.from <= entry.to))
       fail(fmt::format("it goes from {} to {} s", entry.from, entry.to), "from at or before to", "exchange them");
-    require_course("scale", entry.scale);
+    require_time_table("scale", entry.scale);
   }
   void look(const Drag& entry) const {
     require_slot(entry.slot);
@@ -195,16 +195,16 @@ class Checker {
     }
   }
 
-  void require_course(const char* what, const Course& course) const {
-    if (course.times.empty() || course.times.size() != course.values.size()) {
-      fail(fmt::format("{} has {} times and {} values", what, course.times.size(), course.values.size()),
+  void require_time_table(const char* what, const TimeTable& table) const {
+    if (table.times.empty() || table.times.size() != table.values.size()) {
+      fail(fmt::format("{} has {} times and {} values", what, table.times.size(), table.values.size()),
            "one value a time, one or more", "add what is missing");
     }
-    for (const double value : course.values) finite(what, value);
-    for (std::size_t k = 0; k < course.times.size(); ++k) {
-      finite("a time", course.times[k]);
-      if (k > 0 && course.times[k] < course.times[k - 1]) {
-        fail(fmt::format("time {} s comes after {} s", course.times[k], course.times[k - 1]), "times that ascend", "sort them");
+    for (const double value : table.values) finite(what, value);
+    for (std::size_t k = 0; k < table.times.size(); ++k) {
+      finite("a time", table.times[k]);
+      if (k > 0 && table.times[k] < table.times[k - 1]) {
+        fail(fmt::format("time {} s comes after {} s", table.times[k], table.times[k - 1]), "times that ascend", "sort them");
       }
     }
   }

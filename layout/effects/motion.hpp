@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "layout/effects/course.hpp"
+#include "layout/effects/time_table.hpp"
 #include "layout/effects/facts.hpp"
 #include "layout/field.hpp"
 
@@ -14,7 +14,7 @@ namespace linden {
 /// neither friction nor limits of its own.
 struct JointMotion {
   Index row;
-  Course position;                  // [rad, m]; no two times are equal
+  TimeTable position;                  // [rad, m]; no two times are equal
   std::vector<double> velocities{};  // at those points [rad/s, m/s]; none: the curve's own, which never overshoots
 
   static constexpr EffectFacts facts{.name = "motion",

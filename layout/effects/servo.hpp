@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "layout/effects/course.hpp"
+#include "layout/effects/time_table.hpp"
 #include "layout/effects/facts.hpp"
 #include "layout/field.hpp"
 
@@ -18,9 +18,9 @@ struct Servo {
   double damping = 0;  // [N m s/rad, N s/m]
   double target = 0;   // [rad, m]
   double max_force = std::numeric_limits<double>::infinity();  // [N m, N]
-  Course target_over_time{{}, {}};  // [rad, m]; goes over target where it has any points
-  Course target_velocity{};         // [rad/s, m/s]; that of a moving target is not taken from it
-  Course feedforward{};             // [N m, N]
+  TimeTable target_over_time{{}, {}};  // [rad, m]; goes over target where it has any points
+  TimeTable target_velocity{};         // [rad/s, m/s]; that of a moving target is not taken from it
+  TimeTable feedforward{};             // [N m, N]
 
   bool target_moves() const { return !target_over_time.times.empty(); }
   double target_at(double time) const { return target_moves() ? target_over_time.at(time) : target; }

@@ -2,7 +2,7 @@
 // Values of kernels/effects/torque.hpp.
 #pragma once
 
-#include "layout/effects/course.hpp"
+#include "layout/effects/time_table.hpp"
 #include "layout/effects/facts.hpp"
 #include "layout/field.hpp"
 
@@ -10,7 +10,7 @@ namespace linden {
 
 struct JointTorque {
   Index row;
-  Course force;  // [N m, N]
+  TimeTable force;  // [N m, N]
 
   static constexpr EffectFacts facts{.name = "torque", .owners = "torques", .site = Site::joint, .account = Account::given};
 };

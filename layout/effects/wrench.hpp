@@ -5,7 +5,7 @@
 #include <array>
 #include <limits>
 
-#include "layout/effects/course.hpp"
+#include "layout/effects/time_table.hpp"
 #include "layout/effects/facts.hpp"
 #include "layout/field.hpp"
 
@@ -20,9 +20,9 @@ struct BodyWrench {
   bool in_world = true;            // directions of force and moment: the world's, or the body's
   double from = -std::numeric_limits<double>::infinity();  // [s]
   double to = std::numeric_limits<double>::infinity();
-  Course scale{{0}, {1}};          // force and moment over time, as shares of the above
+  TimeTable scale{{0}, {1}};          // force and moment over time, as shares of the above
   double share_at(double time) const;
-  /// Mean of what acts over [begin, end], exactly; ends are as those of Course::mean.
+  /// Mean of what acts over [begin, end], exactly; ends are as those of TimeTable::mean.
   double mean_share(double begin, double end) const;
 
   static constexpr EffectFacts facts{.name = "wrench", .owners = "wrenches", .site = Site::body, .account = Account::given};

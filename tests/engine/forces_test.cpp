@@ -38,41 +38,41 @@ double balance(Simulation& simulation) {
 }
 
 /// Integral of a table over [from, to], trapezoid by trapezoid.
-double integral(const Course& course, double from, double to) {
-  double sum = course.values.front() * std::max(0.0, std::min(to, course.times.front()) - from) +
-               course.values.back() * std::max(0.0, to - std::max(from, course.times.back()));
-  for (std::size_t k = 1; k < course.times.size(); ++k) {
-    const double t0 = course.times[k - 1], t1 = course.times[k], a = std::max(from, t0), b = std::min(to, t1);
+double integral(const TimeTable& table, double from, double to) {
+  double sum = table.values.front() * std::max(0.0, std::min(to, table.times.front()) - from) +
+               table.values.back() * std::max(0.0, to - std::max(from, table.times.back()));
+  for (std::size_t k = 1; k < table.times.size(); ++k) {
+    const double t0 = table.times[k - 1], t1 = table.times[k], a = std::max(from, t0), b = std::min(to, t1);
     if (!(b > a)) continue;
-    const auto value = [&](double t) { return course.values[k - 1] + (t - t0) / (t1 - t0) * (course.values[k] - course.values[k - 1]); };
+    const auto value = [&](double t) { return table.values[k - 1] + (t - t0) / (t1 - t0) * (table.values[k] - table.values[k - 1]); };
     sum += 0.5 * (b - a) * (value(a) + value(b));
   }
   return sum;
 }
 
 /// A table that jumps here and there, with points much closer than steps of `h` and much farther apart.
-Course random_course(Random& random, double duration, double h, double most) {
-  Course course{{}, {}};
+TimeTable random_time_table(Random& random, double duration, double h, double most) {
+  TimeTable table{{}, {}};
   double time = random.uniform(-2 * h, 0.2 * duration);
   while (time < duration) {
-    course.times.push_back(time);
-    course.values.push_back(random.uniform(-most, most));
+    table.times.push_back(time);
+    table.values.push_back(random.uniform(-most, most));
     if (random.uniform(0, 1) < 0.3) continue;
     time += random.uniform(0, 1) < 0.5 ? random.uniform(0, 0.3 * h) : random.uniform(0, 5 * h);
   }
-  return course;
+  return table;
 }
 
 /// amplitude sin(rate t) and its derivatives, on points so close that straight lines between them do.
-Course sinusoid(double amplitude, double rate, double duration, double phase = 0) {
-  Course course{{}, {}};
+TimeTable sinusoid(double amplitude, double rate, double duration, double phase = 0) {
+  TimeTable table{{}, {}};
   constexpr int kPoints = 200'000;
   for (int k = 0; k <= kPoints; ++k) {
     const double time = duration * k / kPoints;
-    course.times.push_back(time);
-    course.values.push_back(amplitude * std::sin(rate * time + phase));
+    table.times.push_back(time);
+    table.values.push_back(amplitude * std::sin(rate * time + phase));
   }
-  return course;
+  return table;
 }
 
 }  // namespace
@@ -86,7 +86,7 @@ TEST_CASE("a push gives a free body its impulse, wherever it begins and ends bet
     BodyWrench push{.slot = 1, .force = {kForce, 0, 0}};
     push.from = random.uniform(-h, 0.6 * duration);
     push.to = push.from + (sample % 2 == 0 ? random.uniform(0, h) : random.uniform(0, 0.5 * duration));
-    if (sample % 3 == 0) push.scale = random_course(random, duration, h, 1);
+    if (sample % 3 == 0) push.scale = random_time_table(random, duration, h, 1);
     effects.wrenches = {push};
     Simulation simulation(body(kMass), still(h), effects);
     set(simulation, {0, 0, 0, 0, 0, 0, 1}, {0, 0, 0, kSpeed, 0, 0});
@@ -108,7 +108,7 @@ TEST_CASE("a torque's table acts with its integral, points within a step and jum
   for (int sample = 0; sample < 100; ++sample) {
     const double h = std::pow(10, random.uniform(-4, -2));
     Effects effects;
-    effects.torques = {{.row = 0, .force = random_course(random, 40 * h, h, 0.2)}, {.row = 0, .force = {{0}, {0.01}}}};
+    effects.torques = {{.row = 0, .force = random_time_table(random, 40 * h, h, 0.2)}, {.row = 0, .force = {{0}, {0.01}}}};
     Simulation simulation(rotor(kInertia), still(h), effects);
     set(simulation, {0}, {kRate});
     const double before = simulation.energy().total();

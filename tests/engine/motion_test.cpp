@@ -40,7 +40,7 @@ Model crane() {
 }
 
 /// Of a joint still to be named.
-JointMotion through(Course course) { return {-1, std::move(course)}; }
+JointMotion through(TimeTable table) { return {-1, std::move(table)}; }
 
 /// A wave by its places and velocities, so many points a second.
 JointMotion wave(double size, double w, double points, double duration) {
@@ -243,22 +243,22 @@ TEST_CASE("A joint that a table holds by two points stays there, however fast it
 }
 
 TEST_CASE("The smooth curve goes through its points, never beyond those around it, and has one slope at each") {
-  const Course course{{0, 0.3, 0.5, 1.1, 1.2, 1.6, 2.5, 2.6}, {1, -0.5, -0.5, -0.4999, 2, 2.5, 0, 0.4}};
-  const SmoothCurve curve(course);
-  const reference::PlainCurve plain(through(course));
-  for (std::size_t k = 0; k < course.times.size(); ++k) CHECK(curve.at(course.times[k]) == Approx(course.values[k]).margin(1e-15));
+  const TimeTable table{{0, 0.3, 0.5, 1.1, 1.2, 1.6, 2.5, 2.6}, {1, -0.5, -0.5, -0.4999, 2, 2.5, 0, 0.4}};
+  const SmoothCurve curve(table);
+  const reference::PlainCurve plain(through(table));
+  for (std::size_t k = 0; k < table.times.size(); ++k) CHECK(curve.at(table.times[k]) == Approx(table.values[k]).margin(1e-15));
   for (double t = -0.2; t < 2.8; t += 0.0137) {
     CHECK(curve.at(t) == Approx(plain.derivative(0, t)).margin(1e-13));
     CHECK(curve.slope(t) == Approx(plain.derivative(1, t)).margin(1e-12));
     std::size_t k = 0;
-    while (k + 2 < course.times.size() && course.times[k + 1] < t) ++k;
-    const auto [least, most] = std::minmax(course.values[k], course.values[k + 1]);
+    while (k + 2 < table.times.size() && table.times[k + 1] < t) ++k;
+    const auto [least, most] = std::minmax(table.values[k], table.values[k + 1]);
     CHECK(curve.at(t) >= least - 1e-12);
     CHECK(curve.at(t) <= most + 1e-12);
     if (t > 0.3 && t < 0.5) CHECK(curve.at(t) == -0.5);
   }
-  for (std::size_t k = 1; k + 1 < course.times.size(); ++k) {
-    CHECK(curve.slope(course.times[k] - 1e-9) == Approx(curve.slope(course.times[k])).margin(1e-5));
+  for (std::size_t k = 1; k + 1 < table.times.size(); ++k) {
+    CHECK(curve.slope(table.times[k] - 1e-9) == Approx(curve.slope(table.times[k])).margin(1e-5));
   }
 }
 

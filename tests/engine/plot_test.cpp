@@ -137,9 +137,9 @@ TEST_CASE("what cannot be drawn is refused with the reason, and no file appears"
   plot::Chart empty = wave(10);
   empty.series.clear();
   CHECK_THROWS_WITH(plot::draw(folder.file("empty.svg"), empty), Catch::Contains("A wave"));
-  plot::Chart uneven = wave(10);
-  uneven.series[0].y.pop_back();
-  CHECK_THROWS(plot::draw(folder.file("uneven.svg"), uneven));
+  plot::Chart start_excess = wave(10);
+  start_excess.series[0].y.pop_back();
+  CHECK_THROWS(plot::draw(folder.file("start_excess.svg"), start_excess));
   CHECK(folder.files().empty());
 }
 

@@ -84,10 +84,10 @@ class ScheduleStepper {
     const double sum = rounding_floor_map(memory.model.tree, memory.constants, memory.work.momentum_target, memory.work.impulse, yields);
     return is_rounding(now.norm, sum, epsilons) ? 1 : 0;
   }
-  bool has_states() const { return memory.plan.revises; }
-  Lanes revise(const Revision<bool>& revision) {
-    REQUIRE_FALSE(revision.late);
-    memory.revision = revision;
+  bool has_states() const { return memory.plan.has_states; }
+  Lanes update_states(const StateUpdate<bool>& update) {
+    REQUIRE_FALSE(update.late);
+    memory.update = update;
     memory.changed = false;
     run({When::states});
     if (!memory.changed) return 0;
@@ -102,7 +102,7 @@ class ScheduleStepper {
     return !fresh_ && 0.5 * now.norm * (now.norm / before) > memory.options.tolerance * memory.options.tolerance * now.scale;
   }
   Lanes refused(Lanes) const { return 0; }
-  void settle(Lanes, Lanes, Lanes) {}
+  void put_aside(Lanes, Lanes, Lanes) {}
   Evaluated<double> cut(double share) {
     memory.share = -share;
     cuts_ = true;

@@ -172,7 +172,7 @@ std::map<std::string, std::vector<std::span<double>>> arrays_of(StepMemory& memo
     JointImpulses<double>::each(memory.effects->parts().joints, all_as("joint impulses"));
     BodyImpulses<double>& bodies = memory.effects->parts().bodies;
     arrays["pose"] = {bodies.pose.flat()};
-    arrays["body impulses"] = {bodies.given.flat(), bodies.uneven.flat(), bodies.pull.flat()};
+    arrays["body impulses"] = {bodies.applied.flat(), bodies.start_excess.flat(), bodies.body_stiffness.flat()};
   }
   return arrays;
 }
@@ -258,7 +258,7 @@ class Watch {
     twin_.factor = memory_.factor;
     twin_.is_first = memory_.is_first;
     twin_.finds_end_momenta = memory_.finds_end_momenta;
-    twin_.revision = memory_.revision;
+    twin_.update = memory_.update;
     twin_.changed = memory_.changed;
   }
 
@@ -312,16 +312,16 @@ TEST_CASE("a scene's schedule holds the sweeps of the effects it names and no ot
   empty_ground.ground = Ground{};
   check_added(armature, {joint, {"armature_map", "armature_energy"}});
   check_added(spring, {joint, {"spring_map"}});
-  check_added(dead_zone, {joint, states, {"begin_dead_zones", "dead_zone_map", "revise_dead_zones", "clear_rows", "dead_zone_map"}});
+  check_added(dead_zone, {joint, states, {"begin_dead_zones", "dead_zone_map", "update_dead_zones", "clear_rows", "dead_zone_map"}});
   check_added(damping, {joint, {"damping_map"}});
-  check_added(friction, {joint, states, {"begin_friction", "friction_map", "revise_friction", "clear_rows", "friction_map"}});
-  check_added(limits, {joint, states, {"begin_limits", "hold_limits", "revise_limits", "clear_rows", "hold_limits"}});
+  check_added(friction, {joint, states, {"begin_friction", "friction_map", "update_friction", "clear_rows", "friction_map"}});
+  check_added(limits, {joint, states, {"begin_limits", "hold_limits", "update_limits", "clear_rows", "hold_limits"}});
   check_added(servo, {joint, {"begin_servos", "servo_map"}});
-  check_added(limited, {joint, states, {"begin_servos", "servo_map", "revise_servos", "clear_rows", "servo_map"}});
+  check_added(limited, {joint, states, {"begin_servos", "servo_map", "update_servos", "clear_rows", "servo_map"}});
   check_added(torque, {joint, {"begin_torques", "torque_map"}});
   check_added(drag, {body, {"drag_map"}});
   check_added(wrench, {body, {"begin_wrenches", "wrench_map"}});
-  check_added(ground, {body, states, {"begin_ground", "guess_ground", "ground_map", "revise_ground", "keep_ground", "find_ground"}});
+  check_added(ground, {body, states, {"begin_ground", "guess_ground", "ground_map", "update_ground", "keep_ground", "find_ground"}});
   const EffectPlan nothing(model, options, empty_ground);
   CHECK(names_of(schedule_of(model, options, nothing)) == plain);
   CHECK_FALSE(nothing.any());

@@ -249,16 +249,17 @@ class Maker {
     double& q = scene_.start.positions[static_cast<std::size_t>(model().tree.first_q(slot))];
     double& v = scene_.start.velocities[static_cast<std::size_t>(row)];
     JointMotion motion{row, {{0}, {q}}};
-    Course& course = motion.position;
+    TimeTable& table = motion.position;
     const double kind = random.uniform(0, 1), apart = h_ * 2 * std::pow(10.0, random.uniform(0, 1));
     const double w = random.uniform(0.02, 0.3) / apart, size = random.uniform(0.2, 1) * std::min(slides(slot) ? 0.1 : 0.8, (slides(slot) ? 0.5 : 3.0) / w);
     const double phase = random.uniform(0, 2 * std::numbers::pi);
     const bool with_velocities = kind > 0.2 && kind <= 0.4;
     if (with_velocities) motion.velocities.push_back(size * w * std::cos(phase));
     for (int k = 1; kind > 0.2 && k < 400; ++k) {
-      course.times.push_back(k * apart);
+      table.times.push_back(k * apart);
       const bool stands = kind > 0.6 && k / 25 % 2 == 0;
-      course.values.push_back(stands ? course.values.back() : course.values.back() + size * (std::sin(w * k * apart + phase) - std::sin(w * (k - 1) * apart + phase)));
+      const double more = stands ? 0 : size * (std::sin(w * k * apart + phase) - std::sin(w * (k - 1) * apart + phase));
+      table.values.push_back(table.values.back() + more);
       if (with_velocities) motion.velocities.push_back(size * w * std::cos(w * k * apart + phase));
     }
     v = reference::PlainCurve(motion).derivative(1, 0);
@@ -302,20 +303,20 @@ class Maker {
 
   /// Targets over time that end, with their speeds or with a force beside, or without.
   void make_tables(Servo& servo, Index slot, double w) {
-    Course course{{}, {}}, speed{{}, {}};
+    TimeTable table{{}, {}}, speed{{}, {}};
     double t = 0, at = servo.target;
     const double stretch = h_ * spread(0.7, 8);
     for (int k = 0; k < 12; ++k) {
       const double next = k == 11 ? at : at + 0.2 * swing_of(slot, w);
-      course.times.push_back(t);
-      course.values.push_back(at);
+      table.times.push_back(t);
+      table.values.push_back(at);
       // a speed that jumps where the target bends
       speed.times.insert(speed.times.end(), {t, t + stretch});
       speed.values.insert(speed.values.end(), 2, k == 11 ? 0 : (next - at) / stretch);
       t += stretch;
       at = next;
     }
-    servo.target_over_time = course;
+    servo.target_over_time = table;
     if (chance(0.5)) servo.target_velocity = speed;
     if (chance(0.3)) servo.feedforward = {{0, t}, {either_way(load(servo.row)), 0}};
   }
@@ -371,24 +372,24 @@ class Maker {
   void make_torques() {
     each_screw([&](Index, Index row) {
       if (chance(0.3)) return;
-      Course course{{}, {}};
+      TimeTable table{{}, {}};
       const double most = load(row) * spread(0.3, 5);
       const int shape = static_cast<int>(random_.below(3));
       double t = 0;
       for (int k = 0; k < 40; ++k) {
         const double value = either_way(most);
-        course.times.push_back(t);
-        course.values.push_back(value);
+        table.times.push_back(t);
+        table.values.push_back(value);
         // held for a step and then jumping; straight from step to step; bent anywhere
         t += shape == 2 ? h_ * random_.uniform(0.2, 3) : h_;
         if (shape == 0) {
-          course.times.push_back(t);
-          course.values.push_back(value);
+          table.times.push_back(t);
+          table.values.push_back(value);
         }
       }
-      if (chance(0.5)) course.values.back() = 0;
+      if (chance(0.5)) table.values.back() = 0;
       if (shape != 1) scene_.bends = true;
-      scene_.effects.torques.push_back({row, course});
+      scene_.effects.torques.push_back({row, table});
     });
     scene_.bends = scene_.bends || !scene_.effects.torques.empty();
   }

@@ -48,7 +48,7 @@ void check_derivative(const Effect& effect) {
     const Vector6 eta = kMove * Vector6::Unit(k);
     const Vector6 difference = (body.added(effect, eta) - body.added(effect, -eta)) / (2 * kMove);
     body.added(effect, Vector6::Zero());
-    const auto pull = Mat6<double>::from(body.sum.pull.row(1));
+    const auto pull = Mat6<double>::from(body.sum.body_stiffness.row(1));
     const Wrench<double> w =
         pull * Twist<double>{{eta[0] / kMove, eta[1] / kMove, eta[2] / kMove}, {eta[3] / kMove, eta[4] / kMove, eta[5] / kMove}};
     Vector6 derivative;
@@ -82,7 +82,7 @@ TEST_CASE("forces of both ends are one wrench in space") {
   wrenches.scale.allocate(1, 1.0);
   wrenches.work.allocate(1);
   const Vector6 begin = -body.added([&](TouchedOnce& it) { wrench_map(wrenches, 0, 1, kStep, it.displacement, it.sum, it.impulse); }, Vector6::Zero());
-  const auto both = load<Wrench, double>(body.sum.given, 1);
+  const auto both = load<Wrench, double>(body.sum.applied, 1);
   // what is left for the end, seen from there, is the same force in the body's frame
   const Wrench<double> end = carried(body.D, both - Wrench<double>::from(begin.data()));
   Vector6 numbers;

@@ -449,11 +449,11 @@ struct Pressed {
     store(sum.pose, 1, scenery.pose);
     potential = find_ground(scenery.plan, sum.pose, points);
   }
-  Vector6 act(const Scenery& scenery, double creep, const Vector6& eta) {
+  Vector6 act(const Scenery& scenery, double stiction_speed, const Vector6& eta) {
     clear_body(sum, 1);
     for (int k = 0; k < 6; ++k) impulse(1, k) = 0;
     store(displacement, 1, scenery.D * exp(twist(eta)));
-    ground_map(scenery.plan, 0, scenery.plan.points.size(), scenery.plan.ground.friction, kStep, creep, displacement, points, sum, impulse);
+    ground_map(scenery.plan, 0, scenery.plan.points.size(), scenery.plan.ground.friction, kStep, stiction_speed, displacement, points, sum, impulse);
     return Eigen::Map<const Vector6>(impulse.row(1));
   }
 };
@@ -467,23 +467,23 @@ TEST_CASE("the factor's share of the ground is near the derivative of its force,
     const bool terrain = round % 2 == 1, rim = round % 3 == 0, ball = round % 3 == 1;
     const Scenery scenery = random_scenery(random, terrain, rim, ball);
     for (const double slides : {0.0, 1.0}) {
-      for (const double creep : {0.0, 1e-3, 10.0}) {
+      for (const double stiction_speed : {0.0, 1e-3, 10.0}) {
         Pressed body(scenery);
         for (Index k = 0; k < body.points.slides.rows(); ++k) body.points.slides(k) = slides;
-        body.act(scenery, creep, Vector6::Zero());
+        body.act(scenery, stiction_speed, Vector6::Zero());
         double closed = 0;
         for (Index k = 0; k < body.points.closed.rows(); ++k) closed += body.points.closed(k);
         if (closed == 0) continue;
         pressed += 1;
-        const auto pull = Mat6<double>::from(body.sum.pull.row(1));
+        const auto pull = Mat6<double>::from(body.sum.body_stiffness.row(1));
         Eigen::Matrix<double, 6, 6> exact, taken;
         constexpr double move = 1e-7;
         for (int k = 0; k < 6; ++k) {
           const Vector6 eta = move * Vector6::Unit(k);
-          exact.col(k) = (body.act(scenery, creep, eta) - body.act(scenery, creep, -eta)) / (2 * move);
+          exact.col(k) = (body.act(scenery, stiction_speed, eta) - body.act(scenery, stiction_speed, -eta)) / (2 * move);
           taken.col(k) = eigen(pull * twist(Vector6::Unit(k)));
         }
-        INFO("terrain " << terrain << ", rim " << rim << ", ball " << ball << ", slides " << slides << ", creep " << creep << "\n" << exact << "\n\n" << taken);
+        INFO("terrain " << terrain << ", rim " << rim << ", ball " << ball << ", slides " << slides << ", stiction_speed " << stiction_speed << "\n" << exact << "\n\n" << taken);
         // a turn of 0.05 rad, and a circle on an edge whose wrench is taken not to bend
         const double tolerance = rim || terrain ? 0.06 : ball ? 1e-3 : 1e-6;
         CHECK((exact - taken).norm() < tolerance * exact.norm());
@@ -523,7 +523,7 @@ TEST_CASE("every lane gets what its own pose calls for, with the same bits in an
       guess_ground(first.plan, Pack(kStep), false, displacement, points);
       clear_body(sum, 1);
       ground_map(first.plan, 0, first.plan.points.size(), Pack(first.plan.ground.friction), Pack(kStep), 0.0, displacement, points, sum, impulse);
-      revise_ground(points, Pack(1.0) > Pack(0.0), Pack(0.0));
+      update_ground(points, Pack(1.0) > Pack(0.0), Pack(0.0));
       CHECK(allocated.count() == 0);
       std::vector<std::array<double, Pack::size>> all;
       const auto keep = [&](const auto& field) {
@@ -534,8 +534,8 @@ TEST_CASE("every lane gets what its own pose calls for, with the same bits in an
         }
       };
       keep(impulse);
-      keep(sum.pull);
-      keep(sum.given);
+      keep(sum.body_stiffness);
+      keep(sum.applied);
       GroundPoints<Pack>::each(points, [&](const char*, const auto& field, Rows, const char*) { keep(field); });
       return all;
     };

@@ -206,14 +206,14 @@ TEST_CASE("friction holds up to its force, slides the way it is pushed, and stop
     Frictions<double> holds = one_friction(entries, 0);
     residual(kRow) = sign * 0.999 * most;
     CHECK(friction_overload(holds, kStep, residual) == Approx(0.999));
-    CHECK_FALSE(revise_friction(holds, kStep, residual, true, 0.0, row.delta));
+    CHECK_FALSE(update_friction(holds, kStep, residual, true, 0.0, row.delta));
     residual(kRow) = sign * 1.001 * most;
-    CHECK_FALSE(revise_friction(holds, kStep, residual, false, 0.0, row.delta));  // not settled yet
-    CHECK_FALSE(revise_friction(holds, kStep, residual, true, 2.0, row.delta));   // another holds more
-    CHECK(revise_friction(holds, kStep, residual, true, 0.0, row.delta));
+    CHECK_FALSE(update_friction(holds, kStep, residual, false, 0.0, row.delta));  // not settled yet
+    CHECK_FALSE(update_friction(holds, kStep, residual, true, 2.0, row.delta));   // another holds more
+    CHECK(update_friction(holds, kStep, residual, true, 0.0, row.delta));
     CHECK(holds.mode(0) == -sign);
     row.delta(kRow) = sign * 1e-6;  // against the way it slides
-    CHECK(revise_friction(holds, kStep, residual, false, 0.0, row.delta));
+    CHECK(update_friction(holds, kStep, residual, false, 0.0, row.delta));
     CHECK(holds.mode(0) == 0);
     CHECK(row.delta(kRow) == 0);
   }
@@ -241,13 +241,13 @@ TEST_CASE("a limit stops a joint where it is, and lets go of one that is pulled 
   hold_limits(stopped, row.sum);
   CHECK(std::isinf(row.sum.stiffness(kRow)));
   residual(kRow) = -1;  // pushed on
-  CHECK_FALSE(revise_limits(stopped, residual, true, false, row.delta));
+  CHECK_FALSE(update_limits(stopped, residual, true, false, row.delta));
   residual(kRow) = 1;  // pulled back
-  CHECK_FALSE(revise_limits(stopped, residual, false, false, row.delta));
-  CHECK(revise_limits(stopped, residual, true, false, row.delta));
+  CHECK_FALSE(update_limits(stopped, residual, false, false, row.delta));
+  CHECK(update_limits(stopped, residual, true, false, row.delta));
   CHECK(stopped.mode(0) == 0);
   row.delta(kRow) = 0.5;
-  CHECK(revise_limits(stopped, residual, true, false, row.delta));
+  CHECK(update_limits(stopped, residual, true, false, row.delta));
   CHECK(row.delta(kRow) == Approx(0.01).epsilon(1e-12));
 }
 
@@ -287,14 +287,14 @@ TEST_CASE("of joints that are at the wrong states one alone changes where that i
   limits.mode(0) = 1;
   Field<double> residual;
   residual.allocate(2, 1.0);
-  CHECK_FALSE(revise_limits(limits, residual, false, true, row.delta));
-  CHECK(revise_limits(limits, residual, true, true, row.delta));
+  CHECK_FALSE(update_limits(limits, residual, false, true, row.delta));
+  CHECK(update_limits(limits, residual, true, true, row.delta));
   CHECK((limits.mode(0) == 1 && limits.mode(1) == 1));
   CHECK(row.delta(kRow) == 0.01);
   residual(kRow) = -1;
-  CHECK(revise_limits(limits, residual, true, true, row.delta));
+  CHECK(update_limits(limits, residual, true, true, row.delta));
   CHECK((limits.mode(0) == 0 && limits.mode(1) == 1));
-  CHECK_FALSE(revise_limits(limits, residual, true, true, row.delta));
+  CHECK_FALSE(update_limits(limits, residual, true, true, row.delta));
 }
 
 TEST_CASE("a limit of velocity leaves a joint its reach within a step, and less where a limit of position is nearer") {
@@ -416,8 +416,8 @@ TEST_CASE("joint effects treat all lanes alike and allocate nothing") {
     frictions.force(0) = in[3];
     residual(kRow) = in[4];
     servos.mode(0) = frictions.mode(0) = zero;
-    revise_servos(servos, row.q_row, h, row.q, row.delta);
-    revise_friction(frictions, h, residual, zero < S(1.0), zero, row.delta);
+    update_servos(servos, row.q_row, h, row.q, row.delta);
+    update_friction(frictions, h, residual, zero < S(1.0), zero, row.delta);
     servo_map(servos, row.q_row, h, row.q, row.sum);
     friction_map(frictions, h, 0.0, row.sum);
     hold_friction(frictions, row.sum);

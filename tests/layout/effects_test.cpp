@@ -70,40 +70,40 @@ Index slot(const std::string& link) { return place_of(model(), link).slot; }
 
 }  // namespace
 
-TEST_CASE("a course goes straight between its points and is held beyond them", "[effects]") {
-  const Course course{{1, 2, 4, 4, 5}, {10, 20, 0, 7, 9}};
-  CHECK(course.at(-3) == 10);
-  CHECK(course.at(1) == 10);
-  CHECK(course.at(1.25) == Approx(12.5));
-  CHECK(course.at(2) == 20);
-  CHECK(course.at(3) == Approx(10));
-  CHECK(course.at(std::nextafter(4, 0)) == Approx(0).margin(1e-12));
-  CHECK(course.at(4) == 7);
-  CHECK(course.at(4.5) == Approx(8));
-  CHECK(course.at(5) == 9);
-  CHECK(course.at(1e9) == 9);
-  CHECK(Course().at(3) == 0);
+TEST_CASE("a table goes straight between its points and is held beyond them", "[effects]") {
+  const TimeTable table{{1, 2, 4, 4, 5}, {10, 20, 0, 7, 9}};
+  CHECK(table.at(-3) == 10);
+  CHECK(table.at(1) == 10);
+  CHECK(table.at(1.25) == Approx(12.5));
+  CHECK(table.at(2) == 20);
+  CHECK(table.at(3) == Approx(10));
+  CHECK(table.at(std::nextafter(4, 0)) == Approx(0).margin(1e-12));
+  CHECK(table.at(4) == 7);
+  CHECK(table.at(4.5) == Approx(8));
+  CHECK(table.at(5) == 9);
+  CHECK(table.at(1e9) == 9);
+  CHECK(TimeTable().at(3) == 0);
 }
 
-TEST_CASE("a course's mean is its integral over the time, exactly", "[effects]") {
-  const Course course{{1, 2, 4, 4, 5}, {10, 20, 0, 7, 9}};
-  CHECK(course.mean(-3, 0.5) == 10);
-  CHECK(course.mean(6, 7) == 9);
-  CHECK(course.mean(1.2, 1.4) == Approx(13).epsilon(1e-14));       // one piece: the value at its middle
-  CHECK(course.mean(0, 6) == Approx((10 + 15 + 20 + 8 + 9) / 6.0).epsilon(1e-14));
-  CHECK(course.mean(3.5, 4.5) == Approx((0.5 * 2.5 + 0.5 * 7.5)).epsilon(1e-14));
-  CHECK(course.mean(3, 4) == Approx(5).epsilon(1e-14));            // the jump at its end is not in it
-  CHECK(course.mean(4, 5) == Approx(8).epsilon(1e-14));
-  CHECK(course.mean(1.999, 2.001) == Approx(20 - 0.0005 * 0.5 * (10 + 10)).epsilon(1e-14));
-  CHECK(course.mean(2, 2) == 20);
-  CHECK(Course().mean(0, 1) == 0);
-  CHECK(Course{{0}, {0.1}}.mean(0.3, 0.7) == 0.1);
+TEST_CASE("a table's mean is its integral over the time, exactly", "[effects]") {
+  const TimeTable table{{1, 2, 4, 4, 5}, {10, 20, 0, 7, 9}};
+  CHECK(table.mean(-3, 0.5) == 10);
+  CHECK(table.mean(6, 7) == 9);
+  CHECK(table.mean(1.2, 1.4) == Approx(13).epsilon(1e-14));       // one piece: the value at its middle
+  CHECK(table.mean(0, 6) == Approx((10 + 15 + 20 + 8 + 9) / 6.0).epsilon(1e-14));
+  CHECK(table.mean(3.5, 4.5) == Approx((0.5 * 2.5 + 0.5 * 7.5)).epsilon(1e-14));
+  CHECK(table.mean(3, 4) == Approx(5).epsilon(1e-14));            // the jump at its end is not in it
+  CHECK(table.mean(4, 5) == Approx(8).epsilon(1e-14));
+  CHECK(table.mean(1.999, 2.001) == Approx(20 - 0.0005 * 0.5 * (10 + 10)).epsilon(1e-14));
+  CHECK(table.mean(2, 2) == 20);
+  CHECK(TimeTable().mean(0, 1) == 0);
+  CHECK(TimeTable{{0}, {0.1}}.mean(0.3, 0.7) == 0.1);
   // parts add up to the whole
   double sum = 0;
-  for (int k = 0; k < 70; ++k) sum += 0.1 * course.mean(0.1 * k - 0.5, 0.1 * k - 0.4);
-  CHECK(sum == Approx(7 * course.mean(-0.5, 6.5)).epsilon(1e-13));
+  for (int k = 0; k < 70; ++k) sum += 0.1 * table.mean(0.1 * k - 0.5, 0.1 * k - 0.4);
+  CHECK(sum == Approx(7 * table.mean(-0.5, 6.5)).epsilon(1e-13));
   // points as close as times can be, and a jump that is not there for its neighbours
-  const Course spike{{0, 1, std::nextafter(1, 2), 2}, {0, 0, 1e3, 0}};
+  const TimeTable spike{{0, 1, std::nextafter(1, 2), 2}, {0, 0, 1e3, 0}};
   CHECK(spike.mean(0, 1) == Approx(0).margin(1e-9));
   CHECK(spike.mean(0.5, 1.5) == Approx(0.5 * 750).epsilon(1e-12));
 }
@@ -296,11 +296,11 @@ TEST_CASE("effects that make no sense are refused, each by its place", "[effects
   refused([&](Effects& e) { e.limits = {{leader, -1, 1, 1.5}}; }, "limits[0]", "restitution is 1.5");
   refused([&](Effects& e) { e.limits = {{.row = leader, .velocity = -1}}; }, "limits[0]", "velocity is -1");
   refused([&](Effects& e) { e.limits = {{.row = leader, .velocity = kNaN}}; }, "limits[0]", "velocity is nan");
-  const Course unsorted{{0, 2, 1}, {0, 0, 0}}, unequal{{}, {1}};
-  for (Course Servo::*table : {&Servo::target_over_time, &Servo::target_velocity, &Servo::feedforward}) {
-    for (const auto& [course, what] : {std::pair{unsorted, "comes after 2 s"}, {unequal, "0 times and 1 values"}}) {
+  const TimeTable unsorted{{0, 2, 1}, {0, 0, 0}}, unequal{{}, {1}};
+  for (TimeTable Servo::*member : {&Servo::target_over_time, &Servo::target_velocity, &Servo::feedforward}) {
+    for (const auto& [table, what] : {std::pair{unsorted, "comes after 2 s"}, {unequal, "0 times and 1 values"}}) {
       Servo servo{.row = leader, .stiffness = 1};
-      servo.*table = course;
+      servo.*member = table;
       refused([&](Effects& e) { e.servos = {servo}; }, "servos[0]", what);
     }
   }

@@ -130,7 +130,7 @@ class PlainScene {
       std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.velocities), nullptr);
       for (const Mimic& mimic : mimics) follows[static_cast<std::size_t>(mimic.follower_v)] = &mimic;
       Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom() - static_cast<Index>(effects.motions.size()));
-      const auto bends = [&](const Course& course) { breaks.insert(breaks.end(), course.times.begin(), course.times.end()); };
+      const auto bends = [&](const TimeTable& table) { breaks.insert(breaks.end(), table.times.begin(), table.times.end()); };
       G = MatrixXd::Zero(tree.velocities, static_cast<Eigen::Index>(effects.motions.size()));
       for (const JointMotion& motion : effects.motions) {
         G(motion.row, static_cast<Eigen::Index>(moved.size())) = 1;
@@ -147,7 +147,7 @@ class PlainScene {
       }
       for (const JointTorque& torque : effects.torques) bends(torque.force);
       for (const Servo& servo : effects.servos) {
-        for (const Course* course : {&servo.target_over_time, &servo.target_velocity, &servo.feedforward}) bends(*course);
+        for (const TimeTable* table : {&servo.target_over_time, &servo.target_velocity, &servo.feedforward}) bends(*table);
       }
       for (const BodyWrench& wrench : effects.wrenches) {
         bends(wrench.scale);

@@ -1,4 +1,4 @@
-#include "engine/scene/scene_course.hpp"
+#include "engine/scene/scene_time_table.hpp"
 
 #include <fmt/format.h>
 
@@ -79,12 +79,12 @@ std::string scene_path(const SceneValue& at, const std::string& folder) {
   return (std::filesystem::path(folder) / at.text("a CSV file")).string();
 }
 
-Course read_course(const SceneValue& at, const std::string& folder) {
+TimeTable read_time_table(const SceneValue& at, const std::string& folder) {
   Columns columns = read_columns(at, folder, {"values"});
   return {std::move(columns.times), std::move(columns.lists[0])};
 }
 
-Course read_course_file(const SceneValue& at, const std::string& folder) {
+TimeTable read_time_table_file(const SceneValue& at, const std::string& folder) {
   Columns columns = columns_of_file(at, folder, 1, 1);
   return {std::move(columns.times), std::move(columns.lists[0])};
 }

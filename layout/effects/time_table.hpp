@@ -1,4 +1,4 @@
-// layout/effects/course.hpp
+// layout/effects/time_table.hpp
 // A number over time.
 #pragma once
 
@@ -8,7 +8,7 @@ namespace linden {
 
 /// A number over time [s]: straight lines between the given points, held before the first and after the last. Times ascend; where
 /// two are equal the number jumps.
-struct Course {
+struct TimeTable {
   std::vector<double> times{0};
   std::vector<double> values{0};
   double at(double time) const;

@@ -1,4 +1,4 @@
-#include "layout/effects/course.hpp"
+#include "layout/effects/time_table.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,16 +8,16 @@ namespace linden {
 namespace {
 
 /// The first point after `time`.
-std::size_t first_after(const Course& course, double time) {
-  return static_cast<std::size_t>(std::ranges::upper_bound(course.times, time) - course.times.begin());
+std::size_t first_after(const TimeTable& table, double time) {
+  return static_cast<std::size_t>(std::ranges::upper_bound(table.times, time) - table.times.begin());
 }
 
 /// The line that ends at point k, at `time`; before the first point and after the last it is level.
-double on_piece(const Course& course, std::size_t k, double time) {
-  if (k == 0) return course.values.front();
-  if (k == course.times.size()) return course.values.back();
-  const double share = (time - course.times[k - 1]) / (course.times[k] - course.times[k - 1]);
-  return course.values[k - 1] + share * (course.values[k] - course.values[k - 1]);
+double on_piece(const TimeTable& table, std::size_t k, double time) {
+  if (k == 0) return table.values.front();
+  if (k == table.times.size()) return table.values.back();
+  const double share = (time - table.times[k - 1]) / (table.times[k] - table.times[k - 1]);
+  return table.values[k - 1] + share * (table.values[k] - table.values[k - 1]);
 }
 
 }  // namespace
@@ -27,9 +27,9 @@ double rounding_of(double begin, double end) {
   return kRoundings * std::numeric_limits<double>::epsilon() * std::max(std::abs(begin), std::abs(end));
 }
 
-double Course::at(double time) const { return on_piece(*this, first_after(*this, time), time); }
+double TimeTable::at(double time) const { return on_piece(*this, first_after(*this, time), time); }
 
-double Course::mean(double begin, double end) const {
+double TimeTable::mean(double begin, double end) const {
   const double slack = rounding_of(begin, end), length = end - begin, last = end - slack;
   std::size_t k = first_after(*this, begin + slack);
   const auto ends = [&] { return k == times.size() || times[k] >= last; };

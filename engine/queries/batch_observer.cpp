@@ -1,0 +1,73 @@
+#include "engine/queries/batch_observer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "layout/packed_history.hpp"
+
+namespace linden {
+
+template <class Real>
+BatchObserver<Real>::BatchObserver(std::shared_ptr<const ObservationSchedule> schedule, const BlockSetup<Real>& setup,
+                                   Instructions instructions)
+    : schedule_(std::move(schedule)),
+      setup_(setup),
+      lanes_(lanes_of<Real>(instructions)),
+      observer_(
+          make_block_observer(instructions, ObserverSetup<Real>{setup.model.tree, setup.constants, *schedule_, setup.options.gravity})) {
+  const auto room = [&](bool asked, Index rows) { return asked ? static_cast<std::size_t>(rows * lanes_) : 0; };
+  const Index nv = setup.model.tree.shape.velocities;
+  const bool reads = schedule_->velocities || schedule_->energy;  // the two are found together
+  v_.resize(room(reads, nv));
+  energy_.resize(room(reads, 2));
+  a_.resize(room(schedule_->accelerations, nv));
+  targets_.resize(room(schedule_->targets, static_cast<Index>(setup.plan.effects.servos.size())));
+  time_.resize(room(true, 1));
+  rows_.resize(room(true, schedule_->width));
+}
+
+/// The difference of the last two displacements over the square of the step, where both are known.
+template <class Real>
+void BatchObserver<Real>::read_accelerations(const Block<Real>& block) {
+  const int words = kHistoryWords<Real> * lanes_;
+  const double rate = 1 / setup_.options.step;
+  for (std::size_t k = 0; k < a_.size(); ++k) {
+    const auto row = static_cast<Index>(k) / lanes_, l = static_cast<Index>(k) % lanes_;
+    const bool known = l < block.count && block.instances[l].displacements > 1;
+    a_[k] = known ? static_cast<Real>(rate * (rate * static_cast<double>(fine_part(block.past[row * words + lanes_ + l])))) : Real(0);
+  }
+}
+
+template <class Real>
+void BatchObserver<Real>::read_targets(const Block<Real>& block) {
+  for (std::size_t k = 0; k < targets_.size(); ++k) {
+    const Servo& servo = setup_.plan.effects.servos[k / static_cast<std::size_t>(lanes_)];
+    const Real given = block.targets != nullptr ? block.targets[k] : static_cast<Real>(std::nan(""));
+    targets_[k] =
+        std::isnan(given) ? static_cast<Real>(servo.target_at(static_cast<double>(time_[k % static_cast<std::size_t>(lanes_)]))) : given;
+  }
+}
+
+template <class Real>
+std::span<const Real> BatchObserver<Real>::observe(const Block<Real>& block, BlockStepper<Real>& stepper) {
+  for (int l = 0; l < block.count; ++l) {
+    time_[static_cast<std::size_t>(l)] = static_cast<Real>(static_cast<double>(block.instances[l].steps) * setup_.options.step);
+  }
+  if (!v_.empty()) stepper.observe(block, v_.data(), energy_.data());
+  if (schedule_->accelerations) read_accelerations(block);
+  if (schedule_->targets) read_targets(block);
+  observer_->observe({.q = block.q,
+                      .v = v_.data(),
+                      .a = a_.data(),
+                      .targets = targets_.data(),
+                      .time = time_.data(),
+                      .energy = energy_.data(),
+                      .mass = block.mass},
+                     rows_.data());
+  return rows_;
+}
+
+template class BatchObserver<double>;
+template class BatchObserver<float>;
+
+}  // namespace linden

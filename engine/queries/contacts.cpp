@@ -1,0 +1,38 @@
+// What acted on bodies in the step that a simulation took last: Simulation::contact_points, Simulation::body_wrenches.
+#include "engine/effects/effect_plan.hpp"
+#include "engine/queries/link_frames.hpp"
+#include "engine/simulation.hpp"
+#include "layout/support/input_error.hpp"
+
+namespace linden {
+namespace {
+
+const StepImpulses& kept(const std::optional<StepImpulses>& impulses) {
+  if (!impulses) throw InputError("what acts on bodies was asked for and none of it is kept; call keep_forces before the step");
+  return *impulses;
+}
+
+}  // namespace
+
+std::vector<double> Simulation::body_wrenches() const {
+  std::vector<double> wrenches = mean_forces(kept(impulses_).bodies);
+  wrenches.resize(static_cast<std::size_t>(model_->tree.shape.slots) * 6);  // without effects on bodies there are none
+  return wrenches;
+}
+
+std::vector<ContactPoint> Simulation::contact_points() const {
+  const StepImpulses& impulses = kept(impulses_);
+  const Kinematics now(*model_, positions());
+  const auto three = [](const std::vector<double>& numbers, std::size_t k) { return Vec3<double>::from(&numbers[3 * k]); };
+  std::vector<ContactPoint> points;
+  for (std::size_t k = 0; k < impulses.closed.size(); ++k) {
+    if (impulses.closed[k] == 0) continue;
+    const Index slot = plan_->ground.points[k].slot;
+    const auto T = linden::load<Placement, double>(now.bodies().pose, slot);
+    points.push_back({slot, array_of(T.p + T.R * three(impulses.places, k)), array_of(three(impulses.normals, k)),
+                      array_of(three(impulses.pushes, k) / options_.step)});
+  }
+  return points;
+}
+
+}  // namespace linden
