@@ -1,27 +1,17 @@
 #include "engine/batch.hpp"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <thread>
 
-#include "engine/effects/effect_plan.hpp"
-#include "engine/queries/batch_observer.hpp"
+#include "engine/batch_data.hpp"
 #include "engine/queries/observations.hpp"
 #include "engine/randomization.hpp"
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
-#include "engine/solve/block_stepper.hpp"
-#include "engine/solve/instance_stepper.hpp"
 #include "engine/start_check.hpp"
-#include "engine/threads.hpp"
-#include "layout/packed_history.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {
@@ -48,235 +38,7 @@ void check_batch(std::int64_t size, const Options& options, const BatchOptions& 
   }
 }
 
-template <class Real>
-BodyConstants<Real> rounded(const BodyConstants<double>& from, const Shape& shape) {
-  BodyConstants<Real> to;
-  to.allocate(shape);
-  const auto copy = [](const auto& source, auto& target) {
-    std::ranges::transform(source.flat(), target.flat().begin(), [](double value) { return static_cast<Real>(value); });
-  };
-  copy(from.screw, to.screw);
-  copy(from.tree_placement, to.tree_placement);
-  copy(from.inertia, to.inertia);
-  copy(from.subtree_mass, to.subtree_mass);
-  return to;
-}
-
-template <class Real>
-std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockSetup<Real>& setup) {
-  return with_or_without(setup.plan, [&](auto effects) {
-    switch (instructions) {
-#ifdef LINDEN_WIDE_LANES
-      case Instructions::avx512: return make_block_stepper<Instructions::avx512, effects>(setup);
-      case Instructions::avx2: return make_block_stepper<Instructions::avx2, effects>(setup);
-#else
-      case Instructions::baseline: return make_block_stepper<Instructions::baseline, effects>(setup);
-#endif
-      default: return make_block_stepper<Instructions::scalar, effects>(setup);
-    }
-  });
-}
-
-template <class T>
-using Numbers = std::vector<T, AlignedAllocator<T>>;
-
 }  // namespace
-
-template <class Real>
-struct BatchOf<Real>::Data {
-  /// What a thread works with.
-  struct Worker {
-    std::unique_ptr<BlockStepper<Real>> block;
-    std::unique_ptr<InstanceStepper> instance;
-    std::unique_ptr<BatchObserver<Real>> observer;  // for the observations that were asked for last
-  };
-
-  std::shared_ptr<const Model> model;
-  BodyConstants<Real> constants;
-  Options options;
-  std::int64_t size, blocks;
-  Instructions instructions;
-  int lanes;
-  int threads;
-  EffectPlan plan;
-  Numbers<Real> q, p, applied, mass, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
-  Numbers<std::uint32_t> past;
-  std::vector<InstanceRecord> records;
-  oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
-  mutable oneapi::tbb::task_arena arena;
-  mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
-
-  Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects, const BatchOptions& computed)
-      : model(std::move(shared)), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
-        instructions(computed.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
-        threads(computed.threads > 0 ? computed.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
-        plan(*model, options, effects),
-        allowed(oneapi::tbb::global_control::max_allowed_parallelism,
-                std::max(static_cast<std::size_t>(threads),
-                         oneapi::tbb::global_control::active_value(oneapi::tbb::global_control::max_allowed_parallelism))),
-        arena(threads) {
-    require_threads(threads);
-    blocks = (size + lanes - 1) / lanes;
-    const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
-    q.resize(rows(shape().positions));
-    p.resize(rows(shape().velocities));
-    past.resize(rows(shape().velocities * kHistoryWords<Real>));
-    if (plan.any()) {
-      excess_before.resize(rows(shape().velocities));
-      reading.resize(rows(shape().velocities));
-      bend.assign(rows(shape().velocities), Real(kAnyBend));
-    }
-    kept.resize(rows(plan.kept()));
-    records.resize(static_cast<std::size_t>(size));
-    const std::vector<double> neutral = model->neutral();
-    for_blocks([&](std::int64_t b, Worker&) {
-      Real* to = q.data() + at(b, shape().positions);
-      for (const double value : neutral) {
-        for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(value);
-      }
-    });
-  }
-
-  static Index count_of(const auto& entries) { return static_cast<Index>(entries.size()); }
-  /// The ground as a list: of one, or none.
-  std::span<const Ground> grounds() const {
-    return plan.effects.ground ? std::span<const Ground>(&*plan.effects.ground, 1) : std::span<const Ground>();
-  }
-  const Shape& shape() const { return model->tree.shape; }
-  std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
-
-  Block<Real> block(std::int64_t b) {
-    const Index nv = shape().velocities;
-    const auto rows_of = [&](auto& numbers, Index count) { return numbers.empty() ? nullptr : numbers.data() + at(b, count); };
-    return {.q = rows_of(q, shape().positions),
-            .p = rows_of(p, nv),
-            .past = rows_of(past, nv * kHistoryWords<Real>),
-            .applied = rows_of(applied, nv),
-            .mass = rows_of(mass, shape().slots * kMassRows),
-            .targets = rows_of(targets, count_of(plan.effects.servos)),
-            .frictions = rows_of(frictions, count_of(plan.effects.friction)),
-            .gains = rows_of(gains, count_of(plan.effects.servos)),
-            .ground_friction = rows_of(ground_friction, 1),
-            .excess_before = rows_of(excess_before, nv),
-            .reading = rows_of(reading, nv),
-            .bend = rows_of(bend, nv),
-            .kept = rows_of(kept, plan.kept()),
-            .instances = records.data() + b * lanes,
-            .count = static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
-  }
-
-  Worker& worker() const {
-    Worker& mine = workers.local();
-    if (!mine.block) {
-      mine.block = make<Real>(instructions, {*model, constants, options, plan});
-      mine.instance = std::make_unique<InstanceStepper>(*model, options, plan);
-    }
-    return mine;
-  }
-
-  /// work(block, worker) for every block, on all threads.
-  template <class Work>
-  void for_blocks(const Work& work) const {
-    arena.execute([&] {
-      oneapi::tbb::parallel_for(std::int64_t{0}, blocks, [&](std::int64_t b) { work(b, worker()); });
-    });
-  }
-
-  /// A number an entry of an effect and instance, at first own(entry).
-  template <class Entries, class Own>
-  BatchView<Real> numbers_of(Numbers<Real>& numbers, const Entries& entries, const Own& own) {
-    if (numbers.empty()) {
-      numbers.resize(at(blocks, count_of(entries)));
-      for_blocks([&](std::int64_t b, Worker&) {
-        Real* to = numbers.data() + at(b, count_of(entries));
-        for (const auto& entry : entries) {
-          for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(own(entry));
-        }
-      });
-    }
-    return {numbers, count_of(entries), lanes, size};
-  }
-
-  void check_observations(const Observations& observations, std::size_t room) const {
-    const ObservationSchedule& schedule = *observations.schedule();
-    require_same_model(schedule, *model);
-    if (schedule.targets) require_same_servos(schedule, plan.effects.servos.size());
-    const std::size_t expected = static_cast<std::size_t>(size) * static_cast<std::size_t>(observations.width());
-    if (room != expected) {
-      throw InputError(fmt::format("observations of {} instances: room for {} numbers given, expected {} x {} = {}", size, room, size,
-                                   observations.width(), expected));
-    }
-    if (!schedule.accelerations) return;
-    const char* const why = std::is_same_v<Real, float> ? "in single precision it keeps too little of its last steps"
-                            : !model->mimics.empty()    ? "with mimic joints it keeps one step alone"
-                                                        : nullptr;
-    if (why != nullptr) throw InputError(fmt::format("accelerations were asked of a batch: {}; leave them out, or ask a Simulation", why));
-  }
-
-  /// Row i of `to` is what is seen of instance i.
-  template <class Number>
-  void observe(const Observations& observations, std::span<Number> to) {
-    check_observations(observations, to.size());
-    const auto width = static_cast<std::size_t>(observations.width());
-    for_blocks([&](std::int64_t b, Worker& mine) {
-      if (!mine.observer || mine.observer->schedule() != observations.schedule().get()) {
-        const BlockSetup<Real> setup{*model, constants, options, plan};
-        mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), setup, instructions);
-      }
-      const Block<Real> here = block(b);
-      const std::span<const Real> rows = mine.observer->observe(here, *mine.block);
-      const auto stride = static_cast<std::size_t>(lanes);
-      for (int l = 0; l < here.count; ++l) {
-        Number* const row = to.data() + static_cast<std::size_t>(b * lanes + l) * width;
-        for (std::size_t k = 0; k < width; ++k) row[k] = static_cast<Number>(rows[k * stride + static_cast<std::size_t>(l)]);
-      }
-    });
-  }
-
-  Real* mass_row(std::int64_t i, Index slot) {
-    return mass.data() + at(i / lanes, shape().slots * kMassRows) + static_cast<std::size_t>(slot * kMassRows * lanes + i % lanes);
-  }
-
-  void check_instance(std::int64_t i) const { require_one_of("instance", i, 0, size - 1); }
-  void check_count(const char* what, std::size_t found, Index expected) const {
-    if (found == static_cast<std::size_t>(expected)) return;
-    throw InputError(fmt::format("{}: {} numbers given for model \"{}\", expected {}", what, found, model->names.model, expected));
-  }
-  void check_body(Index slot) const { require_one_of("body", slot, 1, model->tree.bodies()); }
-
-  void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
-    alone.forget();
-    std::ranges::copy(positions, alone.state().q.flat().begin());
-    plan.put_positions(0, alone.state().q.flat());
-    normalise_positions(*model, alone.state().q.flat());
-    for (std::size_t k = 0; k < velocities.size(); ++k) {
-      if (!std::isfinite(velocities[k])) throw InputError(fmt::format("velocity \"{}\" is {}", model->names.velocity[k], velocities[k]));
-    }
-    if (!mass.empty()) {
-      Field<double, 10>& inertia = alone.own_constants().inertia;
-      for (Index slot = 0; slot < inertia.rows(); ++slot) {
-        for (int k = 0; k < 10; ++k) inertia(slot, k) = static_cast<double>(mass_row(i, slot)[k * lanes]);
-      }
-    }
-    std::vector<double> rates(velocities.begin(), velocities.end());
-    plan.put_velocities(0, rates);
-    alone.set_velocities(rates);
-    const BatchView<Real> to_q(q, shape().positions, lanes, size), to_p(p, shape().velocities, lanes, size);
-    for (Index row = 0; row < shape().positions; ++row) to_q(i, row) = static_cast<Real>(alone.state().q(row));
-    for (Index row = 0; row < shape().velocities; ++row) to_p(i, row) = static_cast<Real>(alone.state().p(row));
-    const auto clear = [&](auto& numbers, Index count_of_rows, double to = 0) {
-      using Number = typename std::remove_reference_t<decltype(numbers)>::value_type;
-      const BatchView<Number> rows(numbers, count_of_rows, lanes, size);
-      for (Index row = 0; !numbers.empty() && row < count_of_rows; ++row) rows(i, row) = static_cast<Number>(to);
-    };
-    clear(past, shape().velocities * kHistoryWords<Real>);
-    clear(excess_before, shape().velocities);
-    clear(reading, shape().velocities);
-    clear(bend, shape().velocities, kAnyBend);
-    clear(kept, plan.kept());
-    records[static_cast<std::size_t>(i)] = {};
-  }
-};
 
 void require_one_of(const char* what, std::int64_t found, std::int64_t first, std::int64_t last) {
   if (found >= first && found <= last) return;
@@ -474,6 +236,43 @@ typename BatchOf<Real>::Observation BatchOf<Real>::observe() const {
 }
 
 template <class Real>
+void BatchOf<Real>::Data::check_observations(const Observations& observations, std::size_t room) const {
+  const ObservationSchedule& schedule = *observations.schedule();
+  require_same_model(schedule, *model);
+  if (schedule.targets) require_same_servos(schedule, plan.effects.servos.size());
+  const std::size_t expected = static_cast<std::size_t>(size) * static_cast<std::size_t>(observations.width());
+  if (room != expected) {
+    throw InputError(fmt::format("observations of {} instances: room for {} numbers given, expected {} x {} = {}", size, room, size,
+                                 observations.width(), expected));
+  }
+  if (!schedule.accelerations) return;
+  const char* const why = std::is_same_v<Real, float> ? "in single precision it keeps too little of its last steps"
+                          : !model->mimics.empty()    ? "with mimic joints it keeps one step alone"
+                                                      : nullptr;
+  if (why != nullptr) throw InputError(fmt::format("accelerations were asked of a batch: {}; leave them out, or ask a Simulation", why));
+}
+
+template <class Real>
+template <class Number>
+void BatchOf<Real>::Data::observe(const Observations& observations, std::span<Number> to) {
+  check_observations(observations, to.size());
+  const auto width = static_cast<std::size_t>(observations.width());
+  for_blocks([&](std::int64_t b, Worker& mine) {
+    if (!mine.observer || mine.observer->schedule() != observations.schedule().get()) {
+      const BlockSetup<Real> setup{*model, constants, options, plan};
+      mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), setup, instructions);
+    }
+    const Block<Real> here = block(b);
+    const std::span<const Real> rows = mine.observer->observe(here, *mine.block);
+    const auto stride = static_cast<std::size_t>(lanes);
+    for (int l = 0; l < here.count; ++l) {
+      Number* const row = to.data() + static_cast<std::size_t>(b * lanes + l) * width;
+      for (std::size_t k = 0; k < width; ++k) row[k] = static_cast<Number>(rows[k * stride + static_cast<std::size_t>(l)]);
+    }
+  });
+}
+
+template <class Real>
 void BatchOf<Real>::observe(const Observations& observations, std::span<double> to) const {
   data_->observe(observations, to);
 }
@@ -513,7 +312,7 @@ std::string BatchOf<Real>::describe(std::int64_t i) const {
 template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
   std::size_t numbers = 0;
-  for (const Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->gains, &data_->frictions,
+  for (const typename Data::template Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->gains, &data_->frictions,
                                     &data_->ground_friction, &data_->excess_before, &data_->reading, &data_->bend, &data_->kept}) {
     numbers += some->size();
   }

@@ -1,0 +1,100 @@
+// engine/batch_data.hpp
+// What a Batch holds and works with, for the files that implement it.
+#pragma once
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/batch.hpp"
+#include "engine/effects/effect_plan.hpp"
+#include "engine/queries/batch_observer.hpp"
+#include "engine/solve/block_stepper.hpp"
+#include "engine/solve/instance_stepper.hpp"
+
+namespace linden {
+
+template <class Real>
+struct BatchOf<Real>::Data {
+  template <class T>
+  using Numbers = std::vector<T, AlignedAllocator<T>>;
+  /// What a thread works with.
+  struct Worker {
+    std::unique_ptr<BlockStepper<Real>> block;
+    std::unique_ptr<InstanceStepper> instance;
+    std::unique_ptr<BatchObserver<Real>> observer;  // for the observations that were asked for last
+  };
+
+  std::shared_ptr<const Model> model;
+  BodyConstants<Real> constants;
+  Options options;
+  std::int64_t size, blocks;
+  Instructions instructions;
+  int lanes;
+  int threads;
+  EffectPlan plan;
+  Numbers<Real> q, p, applied, mass, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
+  Numbers<std::uint32_t> past;
+  std::vector<InstanceRecord> records;
+  oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
+  mutable oneapi::tbb::task_arena arena;
+  mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
+
+  Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects, const BatchOptions& computed);
+
+  static Index count_of(const auto& entries) { return static_cast<Index>(entries.size()); }
+  /// The ground as a list: of one, or none.
+  std::span<const Ground> grounds() const {
+    return plan.effects.ground ? std::span<const Ground>(&*plan.effects.ground, 1) : std::span<const Ground>();
+  }
+  const Shape& shape() const { return model->tree.shape; }
+  std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
+
+  Block<Real> block(std::int64_t b);
+  Worker& worker() const;  // of the thread that asks
+
+  /// work(block, worker) for every block, on all threads.
+  template <class Work>
+  void for_blocks(const Work& work) const {
+    arena.execute([&] {
+      oneapi::tbb::parallel_for(std::int64_t{0}, blocks, [&](std::int64_t b) { work(b, worker()); });
+    });
+  }
+
+  /// A number an entry of an effect and instance, at first own(entry).
+  template <class Entries, class Own>
+  BatchView<Real> numbers_of(Numbers<Real>& numbers, const Entries& entries, const Own& own) {
+    if (numbers.empty()) {
+      numbers.resize(at(blocks, count_of(entries)));
+      for_blocks([&](std::int64_t b, Worker&) {
+        Real* to = numbers.data() + at(b, count_of(entries));
+        for (const auto& entry : entries) {
+          for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(own(entry));
+        }
+      });
+    }
+    return {numbers, count_of(entries), lanes, size};
+  }
+
+  void check_observations(const Observations& observations, std::size_t room) const;
+  /// Row i of `to` is what is seen of instance i.
+  template <class Number>
+  void observe(const Observations& observations, std::span<Number> to);
+
+  Real* mass_row(std::int64_t i, Index slot) {
+    return mass.data() + at(i / lanes, shape().slots * kMassRows) + static_cast<std::size_t>(slot * kMassRows * lanes + i % lanes);
+  }
+
+  void check_instance(std::int64_t i) const { require_one_of("instance", i, 0, size - 1); }
+  void check_count(const char* what, std::size_t found, Index expected) const;
+  void check_body(Index slot) const { require_one_of("body", slot, 1, model->tree.bodies()); }
+
+  void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone);
+};
+
+}  // namespace linden
