@@ -30,6 +30,7 @@ set(linden_public_headers
   engine/randomization.hpp
   engine/scene/load_model.hpp
   engine/scene/scene.hpp
+  engine/scene/scene_bytes.hpp
   engine/scene/scene_file.hpp
   engine/simulation.hpp
   engine/solve/instructions.hpp

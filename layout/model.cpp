@@ -2,30 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
-
+#include "layout/support/checksum.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {
-namespace {
-
-/// FNV-1a, 64 bits.
-class Hash {
- public:
-  template <class T>
-  void add(const T& value) {
-    unsigned char bytes[sizeof(T)];
-    std::memcpy(bytes, &value, sizeof(T));
-    for (const unsigned char byte : bytes) state_ = (state_ ^ byte) * 1099511628211ull;
-  }
-  std::uint64_t value() const { return state_; }
-
- private:
-  std::uint64_t state_ = 14695981039346656037ull;
-};
-
-}  // namespace
-
 std::vector<double> Model::neutral() const {
   std::vector<double> q(static_cast<std::size_t>(tree.shape.positions), 0.0);
   for (const Run& run : tree.runs) {
@@ -38,24 +18,24 @@ std::vector<double> Model::neutral() const {
 }
 
 std::uint64_t Model::hash() const {
-  Hash hash;
+  Checksum hash;
   for (const Run& run : tree.runs) {
-    hash.add(run.begin);
-    hash.add(run.end);
-    hash.add(run.kind);
+    hash.add_number(run.begin);
+    hash.add_number(run.end);
+    hash.add_number(run.kind);
   }
   const auto add_fields = [&](const auto& structure) {
     structure.each(structure, [&](const char*, const auto& field, Rows, const char*) {
-      for (const auto& value : field.flat()) hash.add(value);
+      for (const auto& value : field.flat()) hash.add_number(value);
     });
   };
   add_fields(tree);
   add_fields(constants);
   for (const Mimic& mimic : mimics) {
-    hash.add(mimic.follower_slot);
-    hash.add(mimic.leader_slot);
-    hash.add(mimic.multiplier);
-    hash.add(mimic.offset);
+    hash.add_number(mimic.follower_slot);
+    hash.add_number(mimic.leader_slot);
+    hash.add_number(mimic.multiplier);
+    hash.add_number(mimic.offset);
   }
   return hash.value();
 }
