@@ -133,30 +133,36 @@ void BatchOf<Real>::reset_all(
 
 template <class Real>
 BatchView<Real> BatchOf<Real>::forces() {
-  if (data_->applied.empty()) data_->applied.assign(data_->p.size(), Real(0));
-  return {data_->applied, data_->shape().velocities, lanes(), size()};
+  return data_->asked(data_->applied);
 }
-
+template <class Real>
+BatchView<Real> BatchOf<Real>::gravity() {
+  return data_->asked(data_->gravity);
+}
 template <class Real>
 BatchView<Real> BatchOf<Real>::servo_targets() {
-  return data_->numbers_of(data_->targets, data_->plan.effects.servos, [](const Servo& servo) {
-    return servo.target_moves() ? std::numeric_limits<double>::quiet_NaN() : servo.target;
-  });
+  return data_->asked(data_->targets);
 }
-
 template <class Real>
 BatchView<Real> BatchOf<Real>::gains() {
-  return data_->numbers_of(data_->gains, data_->plan.effects.servos, [](const Servo&) { return 1.0; });
+  return data_->asked(data_->gains);
 }
-
-template <class Real>
-BatchView<Real> BatchOf<Real>::ground_friction() {
-  return data_->numbers_of(data_->ground_friction, data_->grounds(), [](const Ground& ground) { return ground.friction; });
-}
-
 template <class Real>
 BatchView<Real> BatchOf<Real>::friction() {
-  return data_->numbers_of(data_->frictions, data_->plan.effects.friction, [](const JointFriction& entry) { return entry.force; });
+  return data_->asked(data_->frictions);
+}
+template <class Real>
+BatchView<Real> BatchOf<Real>::ground_friction() {
+  return data_->asked(data_->ground_friction);
+}
+
+template <class Real>
+std::vector<std::string> BatchOf<Real>::servo_names() const {
+  return joints_of(model(), data_->plan.effects.servos);
+}
+template <class Real>
+std::vector<std::string> BatchOf<Real>::friction_names() const {
+  return joints_of(model(), data_->plan.effects.friction);
 }
 
 template <class Real>
@@ -178,18 +184,7 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
                                  "not negative and an inertia about the centre of mass that is positive definite",
                                  i, model().names.body[static_cast<std::size_t>(slot)], m));
   }
-  if (data_->mass.empty()) {
-    data_->mass.resize(data_->at(data_->blocks, tree.shape.slots * kMassRows));
-    data_->for_blocks([&](std::int64_t b, typename Data::Worker&) {
-      Real* to = data_->mass.data() + data_->at(b, tree.shape.slots * kMassRows);
-      for (Index body = 0; body < tree.shape.slots; ++body) {
-        for (Index k = 0; k < kMassRows; ++k) {
-          const Real value = k < 10 ? data_->constants.inertia(body, static_cast<int>(k)) : data_->constants.subtree_mass(body);
-          for (int l = 0; l < lanes(); ++l) *to++ = value;
-        }
-      }
-    });
-  }
+  data_->asked(data_->mass);
   const double more = m - static_cast<double>(data_->mass_row(i, slot)[0]);
   for (std::size_t k = 0; k < 10; ++k) data_->mass_row(i, slot)[k * static_cast<std::size_t>(lanes())] = static_cast<Real>(inertia[k]);
   for (Index body = slot;; body = tree.parent(body)) {
@@ -197,6 +192,19 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
     sum = static_cast<Real>(static_cast<double>(sum) + more);
     if (body == 0) break;
   }
+}
+
+template <class Real>
+void BatchOf<Real>::set_mass(std::int64_t i, Index slot, double mass) {
+  std::array<double, 10> numbers = inertia(i, slot);
+  if (!(numbers[0] > 0)) {
+    throw InputError(fmt::format("instance {}, body \"{}\" has no mass, of which its inertia would follow; expected set_inertia", i,
+                                 model().names.body[static_cast<std::size_t>(slot)]));
+  }
+  const double factor = mass / numbers[0];
+  for (double& number : numbers) number *= factor;
+  numbers[0] = mass;
+  set_inertia(i, slot, numbers);
 }
 
 template <class Real>
@@ -311,13 +319,9 @@ std::string BatchOf<Real>::describe(std::int64_t i) const {
 
 template <class Real>
 std::size_t BatchOf<Real>::bytes() const {
-  std::size_t numbers = 0;
-  for (const typename Data::template Numbers<Real>* some : {&data_->q, &data_->p, &data_->applied, &data_->mass, &data_->targets, &data_->gains, &data_->frictions,
-                                    &data_->ground_friction, &data_->excess_before, &data_->reading, &data_->bend, &data_->kept}) {
-    numbers += some->size();
-  }
-  return numbers * sizeof(Real) +
-         data_->past.size() * sizeof(std::uint32_t) + data_->records.size() * sizeof(InstanceRecord);
+  std::size_t bytes = data_->records.size() * sizeof(InstanceRecord);
+  Data::each(*data_, [&](const auto& numbers, Index) { bytes += numbers.size() * sizeof(numbers[0]); });
+  return bytes;
 }
 
 template class BatchOf<double>;

@@ -26,6 +26,8 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -37,6 +39,7 @@
 
 namespace linden {
 
+class CheckpointBytes;
 class Observations;  // engine/queries/observations.hpp
 struct Scene;
 
@@ -126,6 +129,9 @@ class BatchOf {
   /// call makes room for them, all zero.
   BatchView<Real> forces();
 
+  /// Gravity [m/s^2], world frame, likewise: three rows, at first those of the options.
+  BatchView<Real> gravity();
+
   /// Targets of the servos [rad, m] in the order of Effects::servos, likewise: rows to be written at will, at first those of the effects.
   /// Of a servo whose target is a table the row holds NaN until a number is written, which then goes over the table; NaN gives the servo
   /// back to it.
@@ -137,6 +143,9 @@ class BatchOf {
   BatchView<Real> friction();
   /// Coulomb's coefficient of the ground, likewise: one row, none without ground; it may not be negative.
   BatchView<Real> ground_friction();
+  /// Joints of the rows of servo_targets and gains, and of friction, as model().names.velocity has them.
+  std::vector<std::string> servo_names() const;
+  std::vector<std::string> friction_names() const;
 
   /// Mass m [kg], first moment m c [kg m] and inertia xx xy xz yy yz zz [kg m^2] about the body frame's origin, of one body of one
   /// instance; the first call gives every instance masses of its own, after it several threads may set those of different instances at once.
@@ -144,6 +153,20 @@ class BatchOf {
   /// call for. Throws InputError for an inertia that is not positive definite.
   void set_inertia(std::int64_t i, Index slot, const std::array<double, 10>& inertia);
   std::array<double, 10> inertia(std::int64_t i, Index slot) const;
+  /// The same of a mass [kg] alone: first moment and inertia go with it, the centre of mass stays. Throws InputError too where the body has
+  /// no mass so far.
+  void set_mass(std::int64_t i, Index slot, double mass);
+
+  /// All that the batch depends on (positions and momenta, what was set of each instance, records), so that what goes on from it is the same
+  /// to the bit: by the same instructions, on any number of threads; by others it differs by rounding. What was never asked for (forces(),
+  /// gravity(), ...) is as options and effects of the batch have it that loads; views stay what they are. load throws InputError for a
+  /// checkpoint of another model, number of instances, precision, step or gravity, of effects on other joints or bodies (their numbers may
+  /// be others), and for what is damaged or no checkpoint of a batch; the batch is then unchanged.
+  void save(const std::string& file) const;
+  void load(const std::string& file);
+  /// The same in memory. name: of where the bytes come from, for messages.
+  std::string checkpoint() const;
+  void restore(std::string_view bytes, const std::string& name = "checkpoint");
 
   /// n steps of every instance that is not frozen.
   void step(std::int64_t n = 1);
@@ -176,6 +199,8 @@ class BatchOf {
   std::size_t bytes() const;
 
  private:
+  void restore(CheckpointBytes& bytes);
+
   struct Data;
   std::unique_ptr<Data> data_;
 };

@@ -7,7 +7,6 @@
 #include <thread>
 
 #include "engine/threads.hpp"
-#include "layout/packed_history.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {
@@ -84,6 +83,7 @@ Block<Real> BatchOf<Real>::Data::block(std::int64_t b) {
           .past = rows_of(past, nv * kHistoryWords<Real>),
           .applied = rows_of(applied, nv),
           .mass = rows_of(mass, shape().slots * kMassRows),
+          .gravity = rows_of(gravity, 3),
           .targets = rows_of(targets, count_of(plan.effects.servos)),
           .frictions = rows_of(frictions, count_of(plan.effects.friction)),
           .gains = rows_of(gains, count_of(plan.effects.servos)),
@@ -104,6 +104,17 @@ typename BatchOf<Real>::Data::Worker& BatchOf<Real>::Data::worker() const {
     mine.instance = std::make_unique<InstanceStepper>(*model, options, plan);
   }
   return mine;
+}
+
+template <class Real>
+BatchView<Real> BatchOf<Real>::Data::asked(Numbers<Real>& numbers) {
+  Index rows = 0;
+  each_asked(*this, [&](Numbers<Real>& one, Index count, const auto& own) {
+    if (&one != &numbers) return;
+    rows = count;
+    if (one.empty()) fill(one, count, own);
+  });
+  return {numbers, rows, lanes, size};
 }
 
 template <class Real>

@@ -13,9 +13,11 @@
 
 #include "engine/batch.hpp"
 #include "engine/effects/effect_plan.hpp"
+#include "engine/effects/own_numbers.hpp"
 #include "engine/queries/batch_observer.hpp"
 #include "engine/solve/block_stepper.hpp"
 #include "engine/solve/instance_stepper.hpp"
+#include "layout/packed_history.hpp"
 
 namespace linden {
 
@@ -38,7 +40,7 @@ struct BatchOf<Real>::Data {
   int lanes;
   int threads;
   EffectPlan plan;
-  Numbers<Real> q, p, applied, mass, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
+  Numbers<Real> q, p, applied, mass, gravity, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
   Numbers<std::uint32_t> past;
   std::vector<InstanceRecord> records;
   oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
@@ -48,10 +50,6 @@ struct BatchOf<Real>::Data {
   Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects, const BatchOptions& computed);
 
   static Index count_of(const auto& entries) { return static_cast<Index>(entries.size()); }
-  /// The ground as a list: of one, or none.
-  std::span<const Ground> grounds() const {
-    return plan.effects.ground ? std::span<const Ground>(&*plan.effects.ground, 1) : std::span<const Ground>();
-  }
   const Shape& shape() const { return model->tree.shape; }
   std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
 
@@ -66,19 +64,47 @@ struct BatchOf<Real>::Data {
     });
   }
 
-  /// A number an entry of an effect and instance, at first own(entry).
-  template <class Entries, class Own>
-  BatchView<Real> numbers_of(Numbers<Real>& numbers, const Entries& entries, const Own& own) {
-    if (numbers.empty()) {
-      numbers.resize(at(blocks, count_of(entries)));
-      for_blocks([&](std::int64_t b, Worker&) {
-        Real* to = numbers.data() + at(b, count_of(entries));
-        for (const auto& entry : entries) {
-          for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(own(entry));
-        }
-      });
-    }
-    return {numbers, count_of(entries), lanes, size};
+  /// visit(numbers, rows) of all that is kept of the instances, in the order of a checkpoint.
+  template <class Self, class Visit>
+  static void each(Self& self, const Visit& visit) {
+    const Index nv = self.shape().velocities;
+    visit(self.q, self.shape().positions);
+    visit(self.p, nv);
+    visit(self.past, nv * kHistoryWords<Real>);
+    visit(self.excess_before, nv);
+    visit(self.reading, nv);
+    visit(self.bend, nv);
+    visit(self.kept, self.plan.kept());
+    each_asked(self, [&](auto& numbers, Index rows, const auto&) { visit(numbers, rows); });
+  }
+  /// visit(numbers, rows, own) of what has no memory until it is asked for; own(row): what it holds at first.
+  template <class Self, class Visit>
+  static void each_asked(Self& self, const Visit& visit) {
+    const Effects& effects = self.plan.effects;
+    visit(self.applied, self.shape().velocities, [](std::size_t) { return 0.0; });
+    visit(self.mass, self.shape().slots * kMassRows, [&](std::size_t row) {
+      const auto slot = static_cast<Index>(row) / kMassRows;
+      const int k = static_cast<int>(row) % kMassRows;
+      return static_cast<double>(k < 10 ? self.constants.inertia(slot, k) : self.constants.subtree_mass(slot));
+    });
+    visit(self.gravity, 3, [&](std::size_t k) { return self.options.gravity[k]; });
+    visit(self.targets, count_of(effects.servos), [&](std::size_t k) { return own_target(effects.servos[k]); });
+    visit(self.gains, count_of(effects.servos), [](std::size_t) { return 1.0; });
+    visit(self.frictions, count_of(effects.friction), [&](std::size_t k) { return effects.friction[k].force; });
+    visit(self.ground_friction, effects.ground ? 1 : 0, [&](std::size_t) { return effects.ground->friction; });
+  }
+  /// The rows of one of these, which has memory from now on.
+  BatchView<Real> asked(Numbers<Real>& numbers);
+  /// Makes room for them, or puts them where they were at first.
+  template <class Own>
+  void fill(Numbers<Real>& numbers, Index rows, const Own& own) {
+    numbers.resize(at(blocks, rows));
+    for_blocks([&](std::int64_t b, Worker&) {
+      Real* to = numbers.data() + at(b, rows);
+      for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row) {
+        for (int l = 0; l < lanes; ++l) *to++ = static_cast<Real>(own(row));
+      }
+    });
   }
 
   void check_observations(const Observations& observations, std::size_t room) const;

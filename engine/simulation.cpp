@@ -8,6 +8,7 @@
 
 #include "engine/compose/composition.hpp"
 #include "engine/effects/effect_plan.hpp"
+#include "engine/effects/own_numbers.hpp"
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
 #include "engine/solve/instance_stepper.hpp"
@@ -44,6 +45,7 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
     good_p_ = state_.p;
   }
   watch_.emplace(*model_, plan_->effects);
+  for (const BodyWrench& wrench : plan_->effects.wrenches) own_wrenches_.push_back(numbers_of(wrench));
   changed();
   if (!plan_->curves.empty()) set_positions(model_->neutral());
 }
@@ -112,9 +114,14 @@ void Simulation::set_forces(std::span<const double> force) {
     if (std::isfinite(force[i])) continue;
     throw InputError(fmt::format("the force on {} is {}", quoted(model_->names.velocity[i]), force[i]));
   }
-  stepper_->apply(force);
+  applied_.assign(force.begin(), force.end());
+  stepper_->apply(applied_);
   stepper_->refresh(state_);
 }
+
+std::vector<std::string> Simulation::servo_names() const { return joints_of(*model_, plan_->effects.servos); }
+
+std::vector<std::string> Simulation::friction_names() const { return joints_of(*model_, plan_->effects.friction); }
 
 void Simulation::set_servo_targets(std::span<const double> targets) {
   const std::span<double> to = stepper_->controls().servo_targets();

@@ -14,11 +14,14 @@
 // same bits however many there are: an arena of one thread keeps it to one.
 #pragma once
 
+#include <array>
+#include <functional>
 #include <iosfwd>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/effects/effect_work.hpp"
@@ -34,6 +37,7 @@
 
 namespace linden {
 
+class CheckpointBytes;
 struct EffectPlan;
 struct Scene;
 class Stepper;
@@ -94,6 +98,9 @@ class Simulation {
   /// have a table the number goes over it from now on, and NaN gives the servo back to its table; target velocity and feed-forward go on
   /// as the effects say. Throws InputError for a wrong count or another number that is not finite.
   void set_servo_targets(std::span<const double> targets);
+  /// Joints of the servos, as model().names.velocity has them; of the entries of joint friction.
+  std::vector<std::string> servo_names() const;
+  std::vector<std::string> friction_names() const;
   /// As they are now: those that were set, else those of the effects at this time.
   std::vector<double> servo_targets();
   /// Factors of the servos' stiffness and damping as the effects have them, in the order of Effects::servos, likewise; none negative.
@@ -135,22 +142,32 @@ class Simulation {
   std::vector<double> body_wrenches() const;
 
   Energy energy();
-  /// What effects gave and took since the start, or since a checkpoint was loaded [J]. Total energy plus what was taken less what was given
+  /// What effects gave and took since the start, runs that were continued included [J]. Total energy plus what was taken less what was given
   /// stays.
   const EffectWork& effect_work() const { return effect_work_; }
   /// Effects that gave energy although they can only take it, since then: none where all is well (engine/effects/passive_watch.hpp).
   const std::vector<PassiveGift>& passive_gifts() const { return watch_->gifts(); }
   Momentum momentum();
 
-  /// The exact state: a run continued from it is bit-identical. load throws InputError for another model's checkpoint, another step,
-  /// order or gravity, effects on other joints or bodies (their numbers may be others), a file that is cut short or is no checkpoint; the
-  /// simulation is then unchanged.
+  /// All that a run depends on, so that one continued from it is bit-identical: the state, forces, servo targets, gains, friction and wrenches
+  /// that were set, what effects gave and took, and the forces that are kept (keep_forces). What was not set is as the effects of the
+  /// simulation have it that loads. load throws InputError for another model's checkpoint, another step, order or gravity, effects on other
+  /// joints or bodies (their numbers may be others), a file that is cut short or is no checkpoint; the simulation is then unchanged.
   void save(const std::string& file);
   void load(const std::string& file);
+  /// The same in memory. name: of where the bytes come from, for messages.
+  std::string checkpoint();
+  void restore(std::string_view bytes, const std::string& name = "checkpoint");
 
  private:
   /// Of the instance that is meant, where something is randomised.
   explicit Simulation(const std::shared_ptr<const Scene>& instance);
+  struct Continued;
+  Continued continued();
+  void check_continued(const Continued& from, const std::function<void(const std::string&)>& impossible);
+  void go_on(const Continued& from);
+  void restore(CheckpointBytes& bytes);
+  static std::array<double, 6> numbers_of(const BodyWrench& wrench);
   std::vector<double> mean_forces(const std::vector<double>& impulses) const;
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
@@ -163,6 +180,8 @@ class Simulation {
   State<double> state_;
   std::unique_ptr<Stepper> stepper_;
   Field<double> rate_;
+  std::vector<double> applied_;                       // forces that were set; empty: none
+  std::vector<std::array<double, 6>> own_wrenches_;   // force and moment of each wrench as the effects have it
   EffectWork effect_work_;
   std::optional<StepImpulses> impulses_;  // of the step taken last, where they are kept
   std::optional<PassiveWatch> watch_;

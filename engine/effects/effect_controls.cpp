@@ -12,9 +12,13 @@ std::span<double> EffectControls::friction_forces() const {
   return effects_ != nullptr ? effects_->friction_forces().flat() : std::span<double>();
 }
 
+double EffectControls::gain(Index k) const { return effects_ != nullptr ? effects_->gains()(k) : 1; }
+
 void EffectControls::set_gain(Index k, double factor) const {
   if (effects_ != nullptr) effects_->set_gain(k, factor);
 }
+
+double EffectControls::ground_friction() const { return effects_ != nullptr ? effects_->ground_friction() : 0; }
 
 void EffectControls::set_ground_friction(double coefficient) const {
   if (effects_ != nullptr) effects_->ground_friction() = coefficient;

@@ -22,7 +22,9 @@ class EffectControls {
   /// Forces of joint friction [N m, N] in the order of Effects::friction, likewise.
   std::span<double> friction_forces() const;
   /// Factor of the stiffness and damping of servo k; Coulomb's coefficient of the ground.
+  double gain(Index k) const;
   void set_gain(Index k, double factor) const;
+  double ground_friction() const;
   void set_ground_friction(double coefficient) const;
 
   /// Rows [nv] that velocities are read from beside the momenta (EffectSweeps::end_reading); written where the state becomes another's.

@@ -174,14 +174,18 @@ void EffectPlan::place_ground(const Model& model, const Options& options) {
   if (const auto& terrain = effects.ground->terrain) ground.highest = std::ranges::max(terrain->heights);
   if (ground.points.empty()) return;
   const double h = step_;
-  const auto& g = options.gravity;
-  const double pull = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   ground.frame = plane_frame(effects.ground->normal);
   ground.recovery = h * kRecovery;
-  ground.least_load = kLeastLoad * model.constants.subtree_mass(0) * (pull > 0 ? pull : kUsualGravity);
+  least_load_mass_ = kLeastLoad * model.constants.subtree_mass(0);
+  ground.least_load = least_load(options.gravity);
   for (const GroundPoint& point : ground.points) {
     ground.share.push_back(begin_share(h * h * effects.ground->stiffness / mass[static_cast<std::size_t>(point.slot)]));
   }
+}
+
+double EffectPlan::least_load(const std::array<double, 3>& gravity) const {
+  const double pull = std::sqrt(gravity[0] * gravity[0] + gravity[1] * gravity[1] + gravity[2] * gravity[2]);
+  return least_load_mass_ * (pull > 0 ? pull : kUsualGravity);
 }
 
 /// What the laws of bodies touch, body by body.

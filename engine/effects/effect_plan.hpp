@@ -61,6 +61,8 @@ struct EffectPlan {
   void put_velocities(double time, std::span<double> v) const;
   /// Numbers beside those of rows that are kept from step to step (EffectSweeps::kept).
   Index kept() const { return kept_; }
+  /// N_least of the ground (kernels/effects/ground_contact.hpp) where gravity [m/s^2] is another than that of the options [N].
+  double least_load(const std::array<double, 3>& gravity) const;
 
  private:
   void place_joints(const Model& model);
@@ -69,6 +71,7 @@ struct EffectPlan {
   void follow_laws(const LawSetup& setup);
 
   double step_;
+  double least_load_mass_ = 0;  // [kg]
   Index kept_ = 0;
 };
 

@@ -90,7 +90,13 @@ class EffectSweeps {
   Field<S>& friction_forces() { return law<FrictionLaw<S>>().forces(); }
   const Field<S>& gains() const { return law<ServoLaw<S>>().gains(); }
   void set_gain(Index k, const S& factor) { law<ServoLaw<S>>().set_gain(k, factor); }
-  S& ground_friction() { return std::get<GroundLaw<S>>(body_laws_).friction(); }
+  S& ground_friction() { return std::get<GroundLaw<S>>(body_laws_).own().mu; }
+  const S& ground_friction() const { return ground().own().mu; }
+  /// Gravity is another than that of the options.
+  void use_gravity(const LaneGravity<S>& gravity) {
+    std::get<GroundLaw<S>>(body_laws_).own().least_load =
+        of_each_lane<S>(gravity, [&](const std::array<double, 3>& g) { return plan_.least_load(g); });
+  }
 
   /// After placements changed. Returns the potential energy of springs and of the ground at q [J].
   S refresh(const Field<S, 12>& placement, const Field<S>& q) {

@@ -29,6 +29,7 @@ class LaneEffects {
     before_.allocate(tree_.shape.velocities);
   }
   EffectSweeps<Pack>* operator->() { return &sweeps_; }
+  void use_gravity(const LaneGravity<Pack>& gravity) { sweeps_.use_gravity(gravity); }
   const EffectPlan& plan() const { return sweeps_.plan(); }
 
   void load(const Block<Real>& block) {

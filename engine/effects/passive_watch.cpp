@@ -13,27 +13,27 @@ PassiveWatch::PassiveWatch(const Model& model, const Effects& effects)
     : model_(model), still_air_(effects.wind == std::array<double, 3>{0, 0, 0}) {}
 
 void PassiveWatch::add(const EffectAccount& step, double time) {
-  done_ += step.work.magnitude();
-  scale_ = std::max({scale_, step.kinetic, done_});
+  known_.done += step.work.magnitude();
+  known_.scale = std::max({known_.scale, step.kinetic, known_.done});
   for (std::size_t k = 0; k < kEffectLists; ++k) {
     const EffectFacts& facts = *kEffectFacts[k];
     if (facts.account != Account::taken || (k == kListOf<Drag> && !still_air_)) continue;
-    Watched& watched = watched_[k];
+    Watched& watched = known_.watched[k];
     watched.taken += step.work.each[k];
     watched.most = std::max(watched.most, watched.taken);
     const double gift = watched.most - watched.taken;
-    if (!(gift > kGift * scale_)) continue;
+    if (!(gift > kGift * known_.scale)) continue;
     if (watched.gift < 0) {
       const LeastLoss& least = step.least[k];
       const bool on_joints = facts.site == Site::joint;
       const auto& names = on_joints ? model_.names.velocity : model_.names.body;
-      watched.gift = static_cast<int>(gifts_.size());
-      gifts_.push_back({std::string(facts.name),
+      watched.gift = static_cast<int>(known_.gifts.size());
+      known_.gifts.push_back({std::string(facts.name),
                         least.at < 0 ? std::string("no place of its own")
                                      : fmt::format("{} {}", on_joints ? "joint" : "body", quoted(names[static_cast<std::size_t>(least.at)])),
                         time, gift});
     }
-    PassiveGift& told = gifts_[static_cast<std::size_t>(watched.gift)];
+    PassiveGift& told = known_.gifts[static_cast<std::size_t>(watched.gift)];
     told.amount = std::max(told.amount, gift);
   }
 }

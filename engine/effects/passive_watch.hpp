@@ -32,21 +32,27 @@ class PassiveWatch {
   /// After a step that ended at `time`.
   void add(const EffectAccount& step, double time);
   /// One entry an effect at most, in the order in which they were found.
-  const std::vector<PassiveGift>& gifts() const { return gifts_; }
+  const std::vector<PassiveGift>& gifts() const { return known_.gifts; }
+
+  /// All there is to know of the steps so far, for a checkpoint.
+  struct Watched {
+    double taken = 0, most = 0;
+    int gift = -1;  // its entry among the gifts
+  };
+  struct Known {
+    double scale = 0, done = 0;
+    std::array<Watched, kEffectLists> watched{};  // list by list
+    std::vector<PassiveGift> gifts{};
+  };
+  const Known& known() const { return known_; }
+  void go_on(const Known& known) { known_ = known; }
 
  private:
   static constexpr double kGift = 0.01;
 
-  struct Watched {
-    double taken = 0, most = 0;
-    int gift = -1;  // its entry in gifts_
-  };
-
   const Model& model_;
   bool still_air_;  // where none moves, drag gives nothing either
-  double scale_ = 0, done_ = 0;
-  std::array<Watched, kEffectLists> watched_;  // list by list
-  std::vector<PassiveGift> gifts_;
+  Known known_;
 };
 
 /// One sentence for each.

@@ -192,10 +192,18 @@ class RunExecution {
     last_record_ = figures_.run.steps;
   }
 
+  /// Of this run; that of a run which it continues is in the checkpoint.
+  EffectWork work_since_begin() const {
+    EffectWork work = simulation_.effect_work();
+    for (std::size_t k = 0; k < work.each.size(); ++k) work.each[k] -= work_before_.each[k];
+    return work;
+  }
+
   void sample() {
     const Energy energy = simulation_.energy();
-    figures_.taken = simulation_.effect_work().taken();
-    figures_.given = simulation_.effect_work().given();
+    const EffectWork work = work_since_begin();
+    figures_.taken = work.taken();
+    figures_.given = work.given();
     figures_.energy.add(simulation_.time(), energy, figures_.taken, figures_.given);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
     if (figures_.run.steps % arguments_.every == 0) record(energy);
@@ -224,6 +232,7 @@ class RunExecution {
 
   const RunArguments& arguments_;
   Simulation& simulation_;
+  EffectWork work_before_ = simulation_.effect_work();
   RunFigures figures_;
   std::optional<Observer> observer_;  // of what is recorded or plotted
   std::optional<RolloutFile<double>> file_;

@@ -62,7 +62,8 @@ std::span<const Real> BatchObserver<Real>::observe(const Block<Real>& block, Blo
                       .targets = targets_.data(),
                       .time = time_.data(),
                       .energy = energy_.data(),
-                      .mass = block.mass},
+                      .mass = block.mass,
+                      .gravity = block.gravity},
                      rows_.data());
   return rows_;
 }

@@ -32,6 +32,7 @@ class LaneObserver final : public BlockObserver<typename ElementOf<Pack>::type> 
   }
 
   void observe(const ObservedBlock<Real>& block, Real* rows) override {
+    if (block.gravity != nullptr) gravity_ = {L::load(block.gravity), L::load(block.gravity + W), L::load(block.gravity + 2 * W)};
     if (schedule_.follows) follow(block);
     for (const ScheduledLook& look : schedule_.looks) read(block, look, rows + look.offset * W);
   }

@@ -23,6 +23,7 @@ struct Block {
   std::uint32_t* past;        // layout/packed_history.hpp
   const Real* applied;        // [nv] forces given from outside; null: none
   const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
+  const Real* gravity;        // [3] of each instance [m/s^2], world frame; null: that of the options
   const Real* targets;        // [servos] targets of each instance, NaN: of the plan's table; null: the plan's
   const Real* frictions;      // [frictions] forces of each instance; null: the plan's
   const Real* gains;          // [servos] factors of stiffness and damping of each instance; null: 1

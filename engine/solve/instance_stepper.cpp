@@ -33,6 +33,8 @@ std::span<double> InstanceStepper::applied() {
   return applied_;
 }
 
+void InstanceStepper::use_gravity(const std::array<double, 3>& gravity) { stepper_->use_gravity(gravity); }
+
 void InstanceStepper::forget() {
   stepper_->forget();
   std::ranges::fill(state_.history.flat(), 0.0);

@@ -23,6 +23,8 @@ class InstanceStepper {
   BodyConstants<double>& own_constants();
   /// Generalized forces [nv] to be written; from the first call on they count.
   std::span<double> applied();
+  /// Another gravity [m/s^2] than that of the options.
+  void use_gravity(const std::array<double, 3>& gravity);
 
   /// Before all else of an instance: nothing is left of the one before it.
   void forget();

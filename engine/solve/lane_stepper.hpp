@@ -153,6 +153,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     take(sweeps_.q(), state.q.flat());
     take(sweeps_.p(), state.p.flat());
     if (sweeps_.applied() != nullptr) take(*sweeps_.applied(), alone_.applied());
+    if (block.gravity != nullptr) alone_.use_gravity(sweeps_.own_gravity(block)[static_cast<std::size_t>(l)]);
     if constexpr (kEffects) sweeps_.effects().take_out(block, l, alone_.controls());
     if (block.mass != nullptr) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;

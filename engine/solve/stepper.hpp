@@ -6,6 +6,7 @@
 // Jacobian; a step that still fails is split in two. If that fails too the state is left as it was.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -42,6 +43,8 @@ class Stepper {
   virtual void apply(std::span<const double> force) = 0;
   /// Masses and inertias of an instance that differs from the model, followed by a refresh. They must live as long as they are used.
   virtual void use(const BodyConstants<double>& constants) = 0;
+  /// Another gravity [m/s^2] than that of the options, followed by a refresh.
+  virtual void use_gravity(const std::array<double, 3>& gravity) = 0;
   /// The state is another's from now on, or was changed: nothing is known of a step before.
   virtual void forget() = 0;
 

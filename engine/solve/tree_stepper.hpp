@@ -38,6 +38,10 @@ class TreeStepper final : public Stepper {
   void refresh(const State<double>& state) override { sweeps_.refresh(state.q); }
   void apply(std::span<const double> force) override { sweeps_.apply(force); }
   void use(const BodyConstants<double>& constants) override { sweeps_.use(constants); }
+  void use_gravity(const std::array<double, 3>& gravity) override {
+    options_.gravity = gravity;
+    sweeps_.use_gravity(gravity);
+  }
   void forget() override;
   StepReport step(State<double>& state, int& history, double time, double h, Then then) override;
   const EffectAccount& effect_account() const override { return account_; }

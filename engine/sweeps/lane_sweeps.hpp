@@ -48,7 +48,9 @@ class LaneSweeps {
     p_.allocate(shape.velocities);
     applied_.allocate(shape.velocities);
     has_gravity_ = options_.gravity != std::array<double, 3>{0, 0, 0};
-    gravity_ = {number(options_.gravity[0]), number(options_.gravity[1]), number(options_.gravity[2])};
+    LaneGravity<Pack> gravity;
+    gravity.fill(options_.gravity);
+    set_gravity(gravity);
     const double tolerance = sizeof(Real) == sizeof(float) ? std::max(options_.tolerance, kSingleTolerance) : options_.tolerance;
     tolerance_squared_ = number(tolerance * tolerance);
     for (Field<Pack>* field : {&work_.delta, &work_.force, &work_.innovation}) std::ranges::fill(field->flat(), number(0));
@@ -83,6 +85,16 @@ class LaneSweeps {
     if (has_applied_) load_rows(block.applied, applied_);
     constants_.use_masses(block.mass);
     if constexpr (kEffects) effects_.load(block);
+    if (block.gravity != nullptr) use_gravity(own_gravity(block));
+  }
+  /// Of each instance; lanes that hold none have that of the options.
+  LaneGravity<Pack> own_gravity(const Block<Real>& block) const {
+    LaneGravity<Pack> gravity;
+    gravity.fill(options_.gravity);
+    for (int l = 0; l < block.count; ++l) {
+      for (int k = 0; k < 3; ++k) gravity[static_cast<std::size_t>(l)][static_cast<std::size_t>(k)] = static_cast<double>(block.gravity[k * L::count + l]);
+    }
+    return gravity;
   }
   void store(const Block<Real>& block) {
     for (Index row = 0; row < q_.rows(); ++row) L::store(q_(row), block.q + row * L::count);
@@ -180,6 +192,18 @@ class LaneSweeps {
     }
   }
 
+  /// Not inline: the same numbers to the bit of whatever is its own in a lane, and of the options in all.
+  [[gnu::noinline]] void set_gravity(const LaneGravity<Pack>& gravity) {
+    const auto along = [&](std::size_t k) { return of_each_lane<Pack>(gravity, [&](const std::array<double, 3>& g) { return g[k]; }); };
+    gravity_ = {along(0), along(1), along(2)};
+    fall_per_mass_ = of_each_lane<Pack>(gravity, [&](const std::array<double, 3>& g) { return fall_per_mass(g, options_.step); });
+  }
+  void use_gravity(const LaneGravity<Pack>& gravity) {
+    has_gravity_ = true;
+    set_gravity(gravity);
+    if constexpr (kEffects) effects_.use_gravity(gravity);
+  }
+
   Gains<Pack> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
 
   /// The upward half; exact: with a factor made anew, as there always is with effects.
@@ -195,7 +219,7 @@ class LaneSweeps {
     return now;
   }
 
-  Pack fall() const { return number(fall_per_mass(options_.gravity, options_.step)) * constants_.subtree_mass(0); }
+  Pack fall() const { return fall_per_mass_ * constants_.subtree_mass(0); }
 
   // gravity is known when these sweeps are compiled: asked in each body it costs 1.5 % of a step of humanoids
   void advance(const Mask& moves) {
@@ -239,6 +263,7 @@ class LaneSweeps {
   BodyConstants<EachLane<Pack>> constants_;
   bool has_gravity_ = false, has_applied_ = false;
   Vec3<Pack> gravity_;
+  Pack fall_per_mass_;
   Pack tolerance_squared_;
   Workspace<Pack> work_;
   Kept<Pack> kept_;  // empty with effects

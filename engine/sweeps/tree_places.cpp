@@ -67,6 +67,13 @@ void TreeSweeps<kEffects>::apply(std::span<const double> force) {
 }
 
 template <bool kEffects>
+void TreeSweeps<kEffects>::use_gravity(const std::array<double, 3>& gravity) {
+  options_.gravity = gravity;
+  strategy_.gravity = true;
+  if constexpr (kEffects) effects_.use_gravity({gravity});
+}
+
+template <bool kEffects>
 void TreeSweeps<kEffects>::advance(Slots part, State<double>& state) {
   remember(work_.delta, velocities(model_.tree, part), state.history);
   advance_map(model_.tree, work_.motion, work_.delta, part, state.q);

@@ -67,6 +67,7 @@ class TreeSweeps {
   /// See Stepper.
   void apply(std::span<const double> force);
   void use(const BodyConstants<double>& constants) { constants_ = &constants; }
+  void use_gravity(const std::array<double, 3>& gravity);
 
   /// Before all else of a step from these positions, which must stay where they are until it is over.
   void start(const Field<double>& q) { q_ = &q; }

@@ -72,9 +72,9 @@ void guess_ground(const GroundPlan& plan, const S& h, bool known, const Field<S,
   }
 }
 
-/// Points first ... last - 1, all of one body. mu: Coulomb's coefficient, of each instance its own.
+/// Points first ... last - 1, all of one body.
 template <class S>
-void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const S& mu, const S& h, double stiction_speed,
+void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, const OwnFriction<S>& own, const S& h, double stiction_speed,
                 const Field<S, 7>& displacement, GroundPoints<S>& points, BodyImpulses<S>& sum, Field<S, 6>& impulse) {
   if (first == last) return;
   using std::max;
@@ -117,7 +117,7 @@ void ground_map(const GroundPlan& plan, std::size_t first, std::size_t last, con
     const S stiff = weight * as<S>(ground.stiffness), loss = weight * (rate * as<S>(ground.damping)) + (share - half) * stiff;
     const NormalForce<S> normal = normal_force(stiff, loss, gap, meeting.gap.rise, meeting.slip.rise);
     S slides = points.slides(k);
-    const FrictionForce<S> friction = friction_force(plan, mu, h, stiction_speed, gap, normal, meeting.slip.along, slides);
+    const FrictionForce<S> friction = friction_force(plan, own, h, stiction_speed, gap, normal, meeting.slip.along, slides);
     points.slides(k) = slides;
 
     const Vec3<S> a = c + meeting.arm, &n = meeting.normal;

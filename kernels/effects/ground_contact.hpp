@@ -148,6 +148,13 @@ NormalForce<S> normal_force(const S& stiff, const S& loss, const S& gap, const S
           select(closed && next < zero, loss, zero), select(closed, one, zero)};
 }
 
+/// What friction goes by that is each instance's own.
+template <class S>
+struct OwnFriction {
+  S mu;          // Coulomb's coefficient
+  S least_load;  // N_least [N], which goes by gravity
+};
+
 /// The force of friction.
 template <class S>
 struct FrictionForce {
@@ -161,17 +168,17 @@ struct FrictionForce {
 
 /// `slides` is set where friction is smooth.
 template <class S>
-FrictionForce<S> friction_force(const GroundPlan& plan, const S& mu, const S& h, double stiction_speed, const S& gap,
+FrictionForce<S> friction_force(const GroundPlan& plan, const OwnFriction<S>& own, const S& h, double stiction_speed, const S& gap,
                                 const NormalForce<S>& normal, const Vec3<S>& t, S& slides) {
   using std::max;
   using std::sqrt;
-  const S zero(0.0), one(1.0), N = normal.push();
+  const S zero(0.0), one(1.0), mu = own.mu, N = normal.push();
   const S length = sqrt(dot(t, t));
   if (stiction_speed > 0) slides = select(length > h * as<S>(stiction_speed), one, zero);
   const auto closed = normal.closed > zero, sliding = slides > zero, by_load = sliding || as<S>(stiction_speed) > zero;
   const S per_length = stiction_speed > 0 ? one / max(length, h * as<S>(stiction_speed)) : select(length > zero, one / length, zero);
   const S stick = mu / (h * as<S>(kCreep));
-  const S stuck = stick * max(as<S>(-plan.ground.stiffness) * gap, as<S>(plan.least_load));
+  const S stuck = stick * max(as<S>(-plan.ground.stiffness) * gap, own.least_load);
   const S b = select(closed, select(by_load, mu * N * per_length, stuck), zero);
   return {-b * t, per_length * t, b, select(closed && by_load, mu, zero), select(sliding, one, zero),
           select(closed && !by_load, b * length / (mu * N), zero)};

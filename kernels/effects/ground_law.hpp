@@ -17,7 +17,7 @@ class GroundLaw : public BodyLaw<S, Ground> {
       PartSweep{Part::update_states, "update_ground", "points", "points"},
       PartSweep{Part::keep, "keep_ground", "points", "points"},
       PartSweep{Part::place, "find_ground", "pose", "points"}};
-  explicit GroundLaw(const LawSetup& setup) : BodyLaw<S, Ground>(setup), plan_(setup.ground), friction_(as<S>(setup.ground.ground.friction)) {
+  explicit GroundLaw(const LawSetup& setup) : BodyLaw<S, Ground>(setup), plan_(setup.ground), own_{as<S>(plan_.ground.friction), as<S>(plan_.least_load)} {
     points_.allocate({.slots = static_cast<Index>(plan_.points.size())});
   }
   static std::span<const GroundPoint> touching(const LawSetup& setup) { return setup.ground.points; }
@@ -33,7 +33,7 @@ class GroundLaw : public BodyLaw<S, Ground> {
   template <class Element>
   void add(const StepView<S>& step, const BodyConstants<Element>&, std::size_t first, std::size_t last, const Field<S, 7>& displacement,
            BodyImpulses<S>& sum, Field<S, 6>& impulse) {
-    ground_map(plan_, first, last, friction_, step.h, step.stiction_speed, displacement, points_, sum, impulse);
+    ground_map(plan_, first, last, own_, step.h, step.stiction_speed, displacement, points_, sum, impulse);
   }
   S overload(const StepView<S>&, const Field<S>&) const { return ground_overload(points_); }
   MaskOf<S> update_states(const StepView<S>&, const StateUpdate<MaskOf<S>>& now, const S& least, const Field<S>&, Field<S>&) {
@@ -69,8 +69,9 @@ class GroundLaw : public BodyLaw<S, Ground> {
   }
 
   const GroundPoints<S>& points() const { return points_; }
-  /// Coulomb's coefficient, to be written between steps.
-  S& friction() { return friction_; }
+  /// To be written between steps.
+  OwnFriction<S>& own() { return own_; }
+  const OwnFriction<S>& own() const { return own_; }
   /// At the end of the last step [J], and what it has grown by since the step before.
   const S& potential() const { return potential_; }
   S stored() const { return potential_ - potential_before_; }
@@ -78,7 +79,7 @@ class GroundLaw : public BodyLaw<S, Ground> {
  private:
   const GroundPlan& plan_;
   GroundPoints<S> points_;
-  S friction_;
+  OwnFriction<S> own_;
   S potential_ = S(0.0), potential_before_ = S(0.0);
 };
 

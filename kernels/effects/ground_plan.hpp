@@ -35,7 +35,7 @@ struct GroundPoint {
 struct GroundPlan {
   Ground ground;
   std::array<std::array<double, 3>, 3> frame{};  // x, y and normal of the plane, world frame
-  double least_load = 0;                         // N_least [N]
+  double least_load = 0;                         // N_least [N], under the gravity of the options
   double highest = 0;                            // of the terrain over the plane [m]
   std::vector<GroundPoint> points;               // sorted by slot; those of one candidate together
   std::vector<double> share;                     // s of the normal force, one number a point

@@ -1,5 +1,5 @@
 // kernels/effects/lane_times.hpp
-// What goes by the time of an instance, where a Scalar holds several of them, each at its own.
+// What goes by the time or the gravity of an instance, where a Scalar holds several of them, each with its own.
 #pragma once
 
 #include <array>
@@ -17,6 +17,23 @@ inline constexpr std::size_t kLanesOf = sizeof(S) / sizeof(typename ElementOf<S>
 /// When a step begins, in each lane [s]: in double precision whatever that of the lanes is, or tables would be looked up beside it.
 template <class S>
 using LaneTimes = std::array<double, kLanesOf<S>>;
+
+/// Gravity in each lane [m/s^2], world frame.
+template <class S>
+using LaneGravity = std::array<std::array<double, 3>, kLanesOf<S>>;
+
+/// f of what each lane has.
+template <class S, class Each, class Function>
+S of_each_lane(const Each& each, const Function& f) {
+  if constexpr (std::is_arithmetic_v<S>) {
+    return static_cast<S>(f(each[0]));
+  } else {
+    using Real = typename ElementOf<S>::type;
+    std::array<Real, kLanesOf<S>> numbers;
+    for (std::size_t l = 0; l < numbers.size(); ++l) numbers[l] = static_cast<Real>(f(each[l]));
+    return S::load_unaligned(numbers.data());
+  }
+}
 
 /// f of each lane's time.
 template <class S, class Function>

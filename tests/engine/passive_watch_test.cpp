@@ -43,6 +43,21 @@ TEST_CASE("a passive effect that gives is told once, with joint or body, time an
   CHECK(watch.gifts()[1].where == "joint \"" + model.names.velocity[1] + "\"");
 }
 
+TEST_CASE("a watch goes on from all that another one knows") {
+  const Model model = chain(3);
+  PassiveWatch one(model, Effects{}), other(model, Effects{});
+  one.add(step(0.5, 0.2), 0.001);
+  one.add(step(0.1, -0.2), 0.002);
+  REQUIRE(one.gifts().size() == 1);
+  other.go_on(one.known());
+  for (PassiveWatch* watch : {&one, &other}) {
+    watch->add(step(0.1, -0.1), 0.003);
+    watch->add(step(-0.9, 0.1), 0.004);
+  }
+  REQUIRE(other.gifts().size() == 2);
+  for (std::size_t k = 0; k < 2; ++k) CHECK(describe(other.gifts()[k]) == describe(one.gifts()[k]));
+}
+
 TEST_CASE("what a gift is measured by does not vanish as things come to rest") {
   const Model model = chain(2);
   PassiveWatch watch(model, Effects{});

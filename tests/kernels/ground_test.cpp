@@ -453,7 +453,7 @@ struct Pressed {
     clear_body(sum, 1);
     for (int k = 0; k < 6; ++k) impulse(1, k) = 0;
     store(displacement, 1, scenery.D * exp(twist(eta)));
-    ground_map(scenery.plan, 0, scenery.plan.points.size(), scenery.plan.ground.friction, kStep, stiction_speed, displacement, points, sum, impulse);
+    ground_map(scenery.plan, 0, scenery.plan.points.size(), {scenery.plan.ground.friction, scenery.plan.least_load}, kStep, stiction_speed, displacement, points, sum, impulse);
     return Eigen::Map<const Vector6>(impulse.row(1));
   }
 };
@@ -522,7 +522,7 @@ TEST_CASE("every lane gets what its own pose calls for, with the same bits in an
       find_ground(first.plan, sum.pose, points);
       guess_ground(first.plan, Pack(kStep), false, displacement, points);
       clear_body(sum, 1);
-      ground_map(first.plan, 0, first.plan.points.size(), Pack(first.plan.ground.friction), Pack(kStep), 0.0, displacement, points, sum, impulse);
+      ground_map(first.plan, 0, first.plan.points.size(), {Pack(first.plan.ground.friction), Pack(first.plan.least_load)}, Pack(kStep), 0.0, displacement, points, sum, impulse);
       update_ground(points, Pack(1.0) > Pack(0.0), Pack(0.0));
       CHECK(allocated.count() == 0);
       std::vector<std::array<double, Pack::size>> all;
