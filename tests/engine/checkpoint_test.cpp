@@ -30,11 +30,11 @@ std::vector<Setting> settings() {
           {"wrench", [](Simulation& s) { s.set_wrench(1, {5, 6, -7}, {0.2, 0.1, 0}); }}};
 }
 
-/// Lies on its terrain, so that the friction of the ground counts.
+/// Stands on its terrain, so that the friction of the ground counts.
 Scene scene_of_humanoid() {
   Scene scene = busy_scene(load_urdf(model_file("humanoid.urdf"), Base::floating));
   scene.randomization = {};
-  scene.effects.ground->terrain = waves(-0.02);
+  scene.effects.ground->terrain = waves(0.9);
   return scene;
 }
 
