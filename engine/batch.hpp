@@ -15,8 +15,8 @@
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
 //
-// Effects act as in a Simulation, on lanes and threads alike; masses, forces, servo targets and gains, friction of joints and of the ground
-// may differ from instance to instance.
+// Effects act as in a Simulation, on lanes and threads alike; gravity, masses, forces, servo targets and gains, friction of joints and of the
+// ground may differ from instance to instance.
 //
 // Models with mimic joints are stepped an instance at a time, on all threads but without lanes.
 #pragma once

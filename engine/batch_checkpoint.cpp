@@ -87,7 +87,9 @@ std::size_t instance_bytes(const Data& data, std::int64_t there) {
 template <class Data, class Byte, class Work>
 void for_instances(const Data& data, Byte* bytes, std::size_t of_each, const Work& work) {
   data.for_blocks([&](std::int64_t b, auto&) {
-    for (std::int64_t i = b * data.lanes; i < std::min((b + 1) * data.lanes, data.size); ++i) work(i, bytes + of_each * static_cast<std::size_t>(i));
+    for (std::int64_t i = b * data.lanes; i < std::min((b + 1) * data.lanes, data.size); ++i) {
+      work(i, bytes + of_each * static_cast<std::size_t>(i));
+    }
   });
 }
 

@@ -43,7 +43,8 @@ std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockS
 }  // namespace
 
 template <class Real>
-BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects, const BatchOptions& computed)
+BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects,
+                          const BatchOptions& computed)
     : model(std::move(shared)), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
       instructions(computed.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
       threads(computed.threads > 0 ? computed.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
@@ -124,7 +125,8 @@ void BatchOf<Real>::Data::check_count(const char* what, std::size_t found, Index
 }
 
 template <class Real>
-void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) {
+void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities,
+                                InstanceStepper& alone) {
   alone.forget();
   std::ranges::copy(positions, alone.state().q.flat().begin());
   plan.put_positions(0, alone.state().q.flat());

@@ -9,7 +9,8 @@ std::string sealed(std::string_view line, std::string_view bytes) {
   return result.append(reinterpret_cast<const char*>(&sum), sizeof(sum));
 }
 
-std::string_view unsealed(std::string_view line, std::string_view kind, std::string_view what, std::string_view bytes, const std::string& name) {
+std::string_view unsealed(std::string_view line, std::string_view kind, std::string_view what, std::string_view bytes,
+                          const std::string& name) {
   if (!bytes.starts_with(line) && bytes.starts_with(kind)) {
     throw InputError(fmt::format("{}: this {} was written by another version of linden, in another format; expected one that begins with "
                                  "\"{}\"; write it again",

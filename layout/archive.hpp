@@ -1,6 +1,6 @@
 // layout/archive.hpp
-// Plain values as bytes and back, the same to the bit: numbers and enumerations as they lie in memory (little endian), before text and lists
-// how many there are, of structures all members in their order (layout/support/members.hpp).
+// Plain values as bytes and back, the same to the bit: numbers and enumerations as they lie in memory (little endian), before text and
+// lists how many there are, of structures all members in their order (layout/support/members.hpp).
 //
 //   BytesOut out;                         BytesIn in(bytes, "sim.pickle");
 //   out.add(effects);                     in.read(effects);
@@ -32,9 +32,12 @@
 
 namespace linden {
 
-/// The last of an enumeration's values, which begin at 0 and leave none out: others are refused. One has to be stated for each that is read.
+/// The last of an enumeration's values, which begin at 0 and leave none out: others are refused. It has to be stated of each that is read.
 template <class Enum>
-inline constexpr Enum kLastOf = [] { static_assert(!std::is_enum_v<Enum>, "state which value of this enumeration is the last"); return Enum{}; }();
+inline constexpr Enum kLastOf = [] {
+  static_assert(!std::is_enum_v<Enum>, "state which value of this enumeration is the last");
+  return Enum{};
+}();
 
 class BytesOut {
  public:
@@ -212,6 +215,7 @@ std::string sealed(std::string_view line, std::string_view bytes);
 
 /// The bytes of what was sealed. kind: how the line begins, whatever the version. Throws InputError for what is no such thing, another
 /// version, and bytes that are not those that were sealed; `what`: "scene".
-std::string_view unsealed(std::string_view line, std::string_view kind, std::string_view what, std::string_view bytes, const std::string& name);
+std::string_view unsealed(std::string_view line, std::string_view kind, std::string_view what, std::string_view bytes,
+                          const std::string& name);
 
 }  // namespace linden

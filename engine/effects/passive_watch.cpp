@@ -27,11 +27,10 @@ void PassiveWatch::add(const EffectAccount& step, double time) {
       const LeastLoss& least = step.least[k];
       const bool on_joints = facts.site == Site::joint;
       const auto& names = on_joints ? model_.names.velocity : model_.names.body;
+      std::string where = "no place of its own";
+      if (least.at >= 0) where = fmt::format("{} {}", on_joints ? "joint" : "body", quoted(names[static_cast<std::size_t>(least.at)]));
       watched.gift = static_cast<int>(known_.gifts.size());
-      known_.gifts.push_back({std::string(facts.name),
-                        least.at < 0 ? std::string("no place of its own")
-                                     : fmt::format("{} {}", on_joints ? "joint" : "body", quoted(names[static_cast<std::size_t>(least.at)])),
-                        time, gift});
+      known_.gifts.push_back({std::string(facts.name), where, time, gift});
     }
     PassiveGift& told = known_.gifts[static_cast<std::size_t>(watched.gift)];
     told.amount = std::max(told.amount, gift);

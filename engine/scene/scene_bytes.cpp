@@ -59,7 +59,8 @@ class ModelCheck {
   void check_tree() const {
     std::vector<JointKind> kinds{JointKind::screw};
     for (const Run& run : tree_.runs) {
-      require(run.begin == static_cast<Index>(kinds.size()) && run.end > run.begin && run.end <= tree_.parent.rows(), "joints out of order");
+      const bool follows = run.begin == static_cast<Index>(kinds.size()) && run.end > run.begin && run.end <= tree_.parent.rows();
+      require(follows, "joints out of order");
       kinds.resize(static_cast<std::size_t>(run.end), run.kind);
     }
     const std::vector<Index> parents(tree_.parent.flat().begin(), tree_.parent.flat().end());
@@ -91,8 +92,8 @@ class ModelCheck {
     };
     std::set<Index> followers;
     for (const Mimic& mimic : model_.mimics) {
-      require(is_screw(mimic.follower_slot, mimic.follower_v, mimic.follower_q) && is_screw(mimic.leader_slot, mimic.leader_v, mimic.leader_q),
-              "a tie between joints that there are not");
+      require(is_screw(mimic.follower_slot, mimic.follower_v, mimic.follower_q), "a tie of a joint that there is not");
+      require(is_screw(mimic.leader_slot, mimic.leader_v, mimic.leader_q), "a tie to a joint that there is not");
       require(std::isfinite(mimic.multiplier) && std::isfinite(mimic.offset), "a tie with a number that is not finite");
       require(followers.insert(mimic.follower_slot).second, "a joint that follows twice");
     }

@@ -91,8 +91,8 @@ class LaneSweeps {
   LaneGravity<Pack> own_gravity(const Block<Real>& block) const {
     LaneGravity<Pack> gravity;
     gravity.fill(options_.gravity);
-    for (int l = 0; l < block.count; ++l) {
-      for (int k = 0; k < 3; ++k) gravity[static_cast<std::size_t>(l)][static_cast<std::size_t>(k)] = static_cast<double>(block.gravity[k * L::count + l]);
+    for (std::size_t l = 0; l < static_cast<std::size_t>(block.count); ++l) {
+      for (std::size_t k = 0; k < 3; ++k) gravity[l][k] = static_cast<double>(block.gravity[k * std::size_t{L::count} + l]);
     }
     return gravity;
   }

@@ -17,7 +17,8 @@ class GroundLaw : public BodyLaw<S, Ground> {
       PartSweep{Part::update_states, "update_ground", "points", "points"},
       PartSweep{Part::keep, "keep_ground", "points", "points"},
       PartSweep{Part::place, "find_ground", "pose", "points"}};
-  explicit GroundLaw(const LawSetup& setup) : BodyLaw<S, Ground>(setup), plan_(setup.ground), own_{as<S>(plan_.ground.friction), as<S>(plan_.least_load)} {
+  explicit GroundLaw(const LawSetup& setup)
+      : BodyLaw<S, Ground>(setup), plan_(setup.ground), own_{as<S>(plan_.ground.friction), as<S>(plan_.least_load)} {
     points_.allocate({.slots = static_cast<Index>(plan_.points.size())});
   }
   static std::span<const GroundPoint> touching(const LawSetup& setup) { return setup.ground.points; }

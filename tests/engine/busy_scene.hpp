@@ -50,13 +50,13 @@ inline Scene busy_scene(const Model& model) {
         effects.limits.push_back({.row = row, .lower = -0.02, .upper = 0.02, .restitution = 0.5});
         break;
       case 4:
-        if (effects.motions.empty()) effects.motions.push_back({.row = row, .position = {{0, 0.05, 0.1}, {0, 0.05, 0}}, .velocities = {0, 0.3, 0}});
+        if (effects.motions.empty()) effects.motions.push_back({row, {{0, 0.05, 0.1}, {0, 0.05, 0}}, {0, 0.3, 0}});
         break;
       default: effects.friction.push_back({row, 0.1}); break;
     }
   }
   for (Index i = 1; i < model.tree.shape.slots; ++i) {
-    if (model.tree.kind(i) == JointKind::ball) effects.ball_springs.push_back({.slot = i, .stiffness = 4, .rest = {0.1, 0, 0, std::sqrt(0.99)}});
+    if (model.tree.kind(i) == JointKind::ball) effects.ball_springs.push_back({i, 4, {0.1, 0, 0, std::sqrt(0.99)}});
     if (model.constants.inertia(i, 0) > 0) effects.drag.push_back({.slot = i, .linear = 0.1, .quadratic = 0.2});
   }
   effects.wind = {1, -2, 0.5};

@@ -26,9 +26,10 @@ std::vector<Instructions> all_instructions() {
 
 template <class Batch>
 void give(Batch& batch) {
+  using Real = typename std::decay_t<decltype(batch.gravity())>::Real;
   for (std::int64_t i = 0; i < batch.size(); ++i) {
     const Gravity& g = kGravities[static_cast<std::size_t>(i) % kGravities.size()];
-    for (std::size_t k = 0; k < 3; ++k) batch.gravity()(i, static_cast<Index>(k)) = static_cast<typename std::decay_t<decltype(batch.gravity())>::Real>(g[k]);
+    for (std::size_t k = 0; k < 3; ++k) batch.gravity()(i, static_cast<Index>(k)) = static_cast<Real>(g[k]);
   }
 }
 

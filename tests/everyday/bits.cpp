@@ -128,7 +128,7 @@ Told told(Simulation& simulation) {
 void check_simulations(const EverydayScene& scene, Differences& found) {
   const std::int64_t half = kSteps / 2;
   Simulation whole = simulation_of(scene, scene.options.step), single = simulation_of(scene, scene.options.step);
-  const Scene same{.model = *scene.model, .options = scene.options, .effects = scene.effects, .start_as_given = true};
+  const Scene same{.model = *scene.model, .options = scene.options, .initial = {}, .effects = scene.effects, .start_as_given = true};
   Simulation resumed(scene_from_bytes(to_bytes(same)));
   whole.run(kSteps);
   const ScratchFolder folder;
