@@ -59,8 +59,7 @@ LINDEN_INLINE Rows6 pass_screw(const Tree& tree, const BodyConstants<double>& co
   for (int k = 0; k < 6; ++k) store_row8(numbers + 8 * k, A.r[k]);
   // along: S^T A by rows, A S by columns; across: the other one, its numbers each in a register
   const Row8 along = r * A.r[2] + t * A.r[5];
-  Row8 d = r * __builtin_shufflevector(along, along, 2, 2, 2, 2, 2, 2, 2, 2) +
-                 t * __builtin_shufflevector(along, along, 5, 5, 5, 5, 5, 5, 5, 5);
+  Row8 d = r * spread<2>(along) + t * spread<5>(along);
   if constexpr (Added::to_joints) d += spread(added.stiffness(tree.first_v(i)));
   const Row8 inverse = 1.0 / d;
   spill_here();
