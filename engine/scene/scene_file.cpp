@@ -45,8 +45,10 @@ struct Entrant {
 
 class SceneReader {
  public:
-  SceneReader(const SceneYaml& yaml, const SceneStart& given)
-      : root_(yaml.root()), given_(given), file_(yaml.file()), folder_(std::filesystem::path(file_).parent_path().string()) {}
+  /// model: given already, beside what the values say.
+  SceneReader(const SceneYaml& yaml, const SceneStart& given, std::optional<Model> model = std::nullopt)
+      : root_(yaml.root()), given_(given), file_(yaml.file()), folder_(std::filesystem::path(file_).parent_path().string()),
+        model_(std::move(model)) {}
 
   Scene read() {
     root_.entries_of(kScene, effect_keys(), "effects");
@@ -129,6 +131,14 @@ class SceneReader {
   }
 
   void read_model() {
+    if (model_) {
+      for (const std::string_view key : {"model", "models", "base", "inertia"}) {
+        const auto there = root_.find(key);
+        if (there) there->fail(fmt::format("{} is here, beside a model that was given", key), "one of them", "leave it out");
+      }
+      scene_.model = *std::move(model_);
+      return;
+    }
     const auto one = root_.find("model"), several = root_.find("models"), base = root_.find("base"), inertia = root_.find("inertia");
     if (one && several) several->fail("model and models are both given", "one of them", "move the model into the list models");
     if (!one && !several)
@@ -300,6 +310,7 @@ class SceneReader {
   SceneValue root_;
   SceneStart given_;
   std::string file_, folder_;
+  std::optional<Model> model_;
   Scene scene_;
   std::vector<PlacedBase> bases_;
 };
@@ -318,6 +329,14 @@ Scene load_scene(const std::string& file, const SceneStart& given) {
 Scene parse_scene(const std::string& text, const std::string& file, const SceneStart& given) {
   const SceneYaml yaml(text, file);
   return SceneReader(yaml, given).read();
+}
+
+Scene scene_of(std::shared_ptr<const YamlNode> values, std::optional<Model> model, const SceneStart& given) {
+  const FilesRead files;
+  const SceneYaml yaml(std::move(values));
+  Scene scene = SceneReader(yaml, given, std::move(model)).read();
+  scene.files = files.names();
+  return scene;
 }
 
 }  // namespace linden

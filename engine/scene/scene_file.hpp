@@ -24,18 +24,23 @@
 //                    and by its seed, and for the one of a run by the seed of `initial` (engine/randomization.hpp). p is a factor from 1 - p
 //                    to 1 + p; [low, high] are factors too, of `friction`, which is the ground's, values
 //
+// A program says the same by values of its own (scene_of), and may bring the model.
+//
 // A floating model starts at its position and rotation, a fixed one sits there.
 // Whatever is wrong - a key or a name that is not known, a value of the wrong kind or one that makes no sense - throws InputError
 // with file, line and advice.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "engine/scene/scene.hpp"
 
 namespace linden {
+
+struct YamlNode;  // engine/scene/scene_yaml.hpp
 
 /// What a command line may say instead of the scene.
 struct SceneStart {
@@ -52,5 +57,9 @@ Scene load_scene(const std::string& file, const SceneStart& given = {});
 
 /// The same from memory; `file` stands for the source, and the files that the scene names are found relative to it.
 Scene parse_scene(const std::string& text, const std::string& file, const SceneStart& given = {});
+
+/// The same of values that no file holds: files that they name are found relative to the current folder. With a model given they are all that a
+/// scene says beside model and base.
+Scene scene_of(std::shared_ptr<const YamlNode> values, std::optional<Model> model = std::nullopt, const SceneStart& given = {});
 
 }  // namespace linden

@@ -19,9 +19,12 @@ namespace {
 
 using Kind = YamlNode::Kind;
 
+/// "file:line: "; nothing where there is no file.
+std::string place_of_line(const std::string& file, int line) { return line == 0 ? "" : fmt::format("{}:{}: ", file, line); }
+
 [[noreturn]] void fail_at(const std::string& file, int line, const std::string& found, std::string_view expected,
                           std::string_view advice) {
-  throw InputError(fmt::format("{}:{}: {}; expected {}; {}", file, line, found, expected, advice));
+  throw InputError(fmt::format("{}{}; expected {}; {}", place_of_line(file, line), found, expected, advice));
 }
 
 /// Builds the tree of values from the parser's events.
@@ -241,10 +244,10 @@ std::string SceneValue::path_to(std::string_view key) const {
   return fmt::format("{}{}{}", path_, path_.empty() ? "" : ".", std::string_view(text).substr(1, text.size() - 2));
 }
 
-std::string SceneValue::place() const { return fmt::format("{}:{}: {}", *file_, line_, path_); }
+std::string SceneValue::place() const { return place_of_line(*file_, line_) + path_; }
 
 void SceneValue::rethrow(const char* message) const {
-  throw InputError(fmt::format("{}:{}: {}{}{}", *file_, line_, path_, path_.empty() ? "" : ": ", message));
+  throw InputError(fmt::format("{}{}{}{}", place_of_line(*file_, line_), path_, path_.empty() ? "" : ": ", message));
 }
 
 double SceneValue::number(std::string_view expected) const {

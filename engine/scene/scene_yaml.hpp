@@ -9,7 +9,7 @@
 //   values have no tags                              !!python/object and the like
 //
 // A SceneValue is a view into a SceneYaml, which must outlive it. Every message is `file:line: what was found; what was expected;
-// what to do`, on one line. Numbers are read as in the "C" locale.
+// what to do`, on one line; of values that no file holds, made by a program, without `file:line: `. Numbers are read as in the "C" locale.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ namespace linden {
 struct YamlNode {
   enum class Kind : std::uint8_t { nothing, text, list, map };
   Kind kind = Kind::nothing;
-  int line = 1;
+  int line = 1;                   // 0: in no file
   std::string text;               // of a text
   std::vector<std::string> keys;  // of a map
   std::vector<int> key_lines;
@@ -108,6 +108,8 @@ class SceneYaml {
 
   /// `file` stands for the source in messages.
   SceneYaml(const std::string& text, std::string file);
+  /// Values that no file holds, each of line 0.
+  explicit SceneYaml(std::shared_ptr<const YamlNode> root) : root_(std::move(root)) {}
   SceneValue root() const { return {*root_, "", root_->line, file_}; }
   const std::string& file() const { return file_; }
 
