@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "engine/batch_data.hpp"
-#include "engine/queries/observations.hpp"
 #include "engine/randomization.hpp"
 #include "engine/required_model.hpp"
 #include "engine/scene/scene.hpp"
@@ -117,6 +116,45 @@ void BatchOf<Real>::reset(std::int64_t i, std::span<const double> positions, std
 }
 
 template <class Real>
+void BatchOf<Real>::reset(std::span<const std::int64_t> which, std::span<const double> positions, std::span<const double> velocities) {
+  const auto nq = static_cast<std::size_t>(data_->shape().positions), nv = static_cast<std::size_t>(data_->shape().velocities);
+  const auto require_count = [&](const char* what, std::size_t found, std::size_t each) {
+    if (found == which.size() * each) return;
+    throw InputError(fmt::format("{} of {} instances: {} numbers given, expected {} x {} = {}", what, which.size(), found, which.size(),
+                                 each, which.size() * each));
+  };
+  require_count("positions", positions.size(), nq);
+  require_count("velocities", velocities.size(), nv);
+  std::vector<bool> named(static_cast<std::size_t>(size()));
+  for (const std::int64_t i : which) {
+    data_->check_instance(i);
+    if (named[static_cast<std::size_t>(i)]) throw InputError(fmt::format("instance {} is to be reset twice; expected it once", i));
+    named[static_cast<std::size_t>(i)] = true;
+  }
+  const auto each = [&](const auto& work) {
+    data_->for_each(std::ssize(which), [&](std::int64_t k, typename Data::Worker& worker) {
+      const auto at = static_cast<std::size_t>(k);
+      work(k, positions.subspan(at * nq, nq), velocities.subspan(at * nv, nv), *worker.instance);
+    });
+  };
+  std::vector<std::string> wrong(which.size());
+  each([&](std::int64_t k, std::span<const double> q, std::span<const double> v, InstanceStepper& alone) {
+    try {
+      data_->place(q, v, alone);
+    } catch (const InputError& error) {
+      wrong[static_cast<std::size_t>(k)] = error.what();
+    }
+  });
+  const auto first = std::ranges::find_if(wrong, [](const std::string& message) { return !message.empty(); });
+  if (first != wrong.end()) {
+    throw InputError(fmt::format("instance {}: {}; none was reset", which[static_cast<std::size_t>(first - wrong.begin())], *first));
+  }
+  each([&](std::int64_t k, std::span<const double> q, std::span<const double> v, InstanceStepper& alone) {
+    data_->start(which[static_cast<std::size_t>(k)], q, v, alone);
+  });
+}
+
+template <class Real>
 void BatchOf<Real>::reset_all(
     const std::function<void(std::int64_t i, std::span<double> positions, std::span<double> velocities)>& start) {
   const std::vector<double> neutral = model().neutral();
@@ -185,11 +223,12 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
                                  i, model().names.body[static_cast<std::size_t>(slot)], m));
   }
   data_->asked(data_->mass);
-  const double more = m - static_cast<double>(data_->mass_row(i, slot)[0]);
   for (std::size_t k = 0; k < 10; ++k) data_->mass_row(i, slot)[k * static_cast<std::size_t>(lanes())] = static_cast<Real>(inertia[k]);
+  // each sum anew, so that it does not depend on the masses there were before
   for (Index body = slot;; body = tree.parent(body)) {
-    Real& sum = data_->mass_row(i, body)[10 * lanes()];
-    sum = static_cast<Real>(static_cast<double>(sum) + more);
+    double sum = static_cast<double>(data_->mass_row(i, body)[0]);
+    for (const Index child : data_->children(body)) sum += static_cast<double>(data_->mass_row(i, child)[10 * lanes()]);
+    data_->mass_row(i, body)[10 * lanes()] = static_cast<Real>(sum);
     if (body == 0) break;
   }
 }
@@ -220,73 +259,12 @@ std::array<double, 10> BatchOf<Real>::inertia(std::int64_t i, Index slot) const 
 }
 
 template <class Real>
-void BatchOf<Real>::step(std::int64_t n) {
-  data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) { worker.block->step(data_->block(b), n); });
-}
-
-template <class Real>
 BatchView<const Real> BatchOf<Real>::positions() const {
   return {data_->q, data_->shape().positions, lanes(), size()};
 }
 template <class Real>
 BatchView<const Real> BatchOf<Real>::momenta() const {
   return {data_->p, data_->shape().velocities, lanes(), size()};
-}
-
-template <class Real>
-typename BatchOf<Real>::Observation BatchOf<Real>::observe() const {
-  const Index nv = data_->shape().velocities;
-  Observation seen{std::vector<Real>(data_->p.size()), std::vector<Real>(data_->at(data_->blocks, 2)), nv, lanes(), size()};
-  data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) {
-    worker.block->observe(data_->block(b), seen.velocity_numbers.data() + data_->at(b, nv), seen.energy_numbers.data() + data_->at(b, 2));
-  });
-  return seen;
-}
-
-template <class Real>
-void BatchOf<Real>::Data::check_observations(const Observations& observations, std::size_t room) const {
-  const ObservationSchedule& schedule = *observations.schedule();
-  require_same_model(schedule, *model);
-  if (schedule.targets) require_same_servos(schedule, plan.effects.servos.size());
-  const std::size_t expected = static_cast<std::size_t>(size) * static_cast<std::size_t>(observations.width());
-  if (room != expected) {
-    throw InputError(fmt::format("observations of {} instances: room for {} numbers given, expected {} x {} = {}", size, room, size,
-                                 observations.width(), expected));
-  }
-  if (!schedule.accelerations) return;
-  const char* const why = std::is_same_v<Real, float> ? "in single precision it keeps too little of its last steps"
-                          : !model->mimics.empty()    ? "with mimic joints it keeps one step alone"
-                                                      : nullptr;
-  if (why != nullptr) throw InputError(fmt::format("accelerations were asked of a batch: {}; leave them out, or ask a Simulation", why));
-}
-
-template <class Real>
-template <class Number>
-void BatchOf<Real>::Data::observe(const Observations& observations, std::span<Number> to) {
-  check_observations(observations, to.size());
-  const auto width = static_cast<std::size_t>(observations.width());
-  for_blocks([&](std::int64_t b, Worker& mine) {
-    if (!mine.observer || mine.observer->schedule() != observations.schedule().get()) {
-      const BlockSetup<Real> setup{*model, constants, options, plan};
-      mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), setup, instructions);
-    }
-    const Block<Real> here = block(b);
-    const std::span<const Real> rows = mine.observer->observe(here, *mine.block);
-    const auto stride = static_cast<std::size_t>(lanes);
-    for (int l = 0; l < here.count; ++l) {
-      Number* const row = to.data() + static_cast<std::size_t>(b * lanes + l) * width;
-      for (std::size_t k = 0; k < width; ++k) row[k] = static_cast<Number>(rows[k * stride + static_cast<std::size_t>(l)]);
-    }
-  });
-}
-
-template <class Real>
-void BatchOf<Real>::observe(const Observations& observations, std::span<double> to) const {
-  data_->observe(observations, to);
-}
-template <class Real>
-void BatchOf<Real>::observe(const Observations& observations, std::span<float> to) const {
-  data_->observe(observations, to);
 }
 
 template <class Real>

@@ -31,6 +31,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "engine/batch_rows.hpp"
 #include "engine/instance_record.hpp"
 #include "engine/options.hpp"
 #include "engine/solve/instructions.hpp"
@@ -40,7 +41,6 @@
 namespace linden {
 
 class CheckpointBytes;
-class Observations;  // engine/queries/observations.hpp
 struct Scene;
 
 /// What a batch is computed with. No result depends on the threads; with other instructions results differ by rounding.
@@ -122,6 +122,9 @@ class BatchOf {
   /// touched; several threads may reset different instances at once. Whether the positions lie within limits or in the ground is not looked
   /// at, resets being many: StartCheck (engine/start_check.hpp) does that where it is wanted.
   void reset(std::int64_t i, std::span<const double> positions, std::span<const double> velocities);
+  /// reset of the instances `which`, each named once, on all threads: positions [which x nq], velocities [which x nv], instance by
+  /// instance. Where one is wrong InputError names it, and none is reset.
+  void reset(std::span<const std::int64_t> which, std::span<const double> positions, std::span<const double> velocities);
   /// reset of every instance on all threads; start(i, positions, velocities) fills both, given as the neutral state at rest.
   void reset_all(const std::function<void(std::int64_t i, std::span<double> positions, std::span<double> velocities)>& start);
 
@@ -129,7 +132,7 @@ class BatchOf {
   /// call makes room for them, all zero.
   BatchView<Real> forces();
 
-  /// Gravity [m/s^2], world frame, likewise: three rows, at first those of the options.
+  /// Gravity [m/s^2], world frame, likewise: three rows, at first those of the options. An instance moves as if it were that of the options.
   BatchView<Real> gravity();
 
   /// Targets of the servos [rad, m] in the order of Effects::servos, likewise: rows to be written at will, at first those of the effects.
@@ -170,6 +173,10 @@ class BatchOf {
 
   /// n steps of every instance that is not frozen.
   void step(std::int64_t n = 1);
+  /// The same, with rows of the caller taken in before and observations given out after. Throws InputError, before anything is changed, for
+  /// spans of another length, for rows of what there is not, for what observe refuses, and, naming instance and joint, for numbers that are
+  /// not finite (but targets of servos that have a table) and negative gains and friction.
+  void step(std::int64_t n, const BatchRows<Real>& rows);
 
   BatchView<const Real> positions() const;
   BatchView<const Real> momenta() const;

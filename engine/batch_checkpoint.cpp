@@ -21,7 +21,7 @@
 namespace linden {
 namespace {
 
-struct Header {
+struct BatchHeader {
   CheckpointOf of;
   std::int64_t instances;
   std::int64_t precision;  // bytes of a number
@@ -29,7 +29,7 @@ struct Header {
   std::int64_t rows;       // bit k: there is the kth of Data::each
   std::int64_t effects;    // bytes
 };
-static_assert(sizeof(Header) == 96, "a checkpoint's header has no padding");
+static_assert(sizeof(BatchHeader) == 96, "a checkpoint's header has no padding");
 
 // Data: BatchOf<Real>::Data
 
@@ -139,9 +139,9 @@ template <class Real>
 std::string BatchOf<Real>::checkpoint() const {
   const Data& data = *data_;
   const std::string effects = effect_owners(data.plan, model().names);
-  const Header header{checkpoint_of(model(), options()), size(), sizeof(Real), data.plan.kept(), rows_there(data),
+  const BatchHeader header{checkpoint_of(model(), options()), size(), sizeof(Real), data.plan.kept(), rows_there(data),
                       static_cast<std::int64_t>(effects.size())};
-  std::string bytes(reinterpret_cast<const char*>(&header), sizeof(Header));
+  std::string bytes(reinterpret_cast<const char*>(&header), sizeof(BatchHeader));
   bytes += effects;
   const std::size_t begin = bytes.size(), of_each = instance_bytes(data, header.rows);
   bytes.resize(begin + of_each * static_cast<std::size_t>(size()));
@@ -163,7 +163,7 @@ template <class Real>
 void BatchOf<Real>::restore(CheckpointBytes& bytes) {
   Data& data = *data_;
   CheckpointReader in(bytes, kOfBatch);
-  const auto header = in.header<Header>();
+  const auto header = in.header<BatchHeader>();
   in.check_model(header.of, model());
   if (header.instances != size()) {
     throw InputError(fmt::format("{}: this checkpoint is one of {} instances; the batch has {}; load it into one of as many", bytes.name(),

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <thread>
 
 #include "engine/threads.hpp"
@@ -45,15 +46,20 @@ std::unique_ptr<BlockStepper<Real>> make(Instructions instructions, const BlockS
 template <class Real>
 BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t count, const Options& given, const Effects& effects,
                           const BatchOptions& computed)
-    : model(std::move(shared)), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
+    : model(std::move(shared)), model_hash(model->hash()), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
       instructions(computed.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
       threads(computed.threads > 0 ? computed.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
       plan(*model, options, effects),
-      allowed(oneapi::tbb::global_control::max_allowed_parallelism,
-              std::max(static_cast<std::size_t>(threads),
-                       oneapi::tbb::global_control::active_value(oneapi::tbb::global_control::max_allowed_parallelism))),
       arena(threads) {
   require_threads(threads);
+  first_child.assign(static_cast<std::size_t>(shape().slots) + 1, 0);
+  for (Index slot = 1; slot < shape().slots; ++slot) ++first_child[static_cast<std::size_t>(model->tree.parent(slot)) + 1];
+  std::partial_sum(first_child.begin(), first_child.end(), first_child.begin());
+  child_list.resize(static_cast<std::size_t>(shape().slots) - 1);
+  std::vector<Index> next = first_child;
+  for (Index slot = 1; slot < shape().slots; ++slot) {
+    child_list[static_cast<std::size_t>(next[static_cast<std::size_t>(model->tree.parent(slot))]++)] = slot;
+  }
   blocks = (size + lanes - 1) / lanes;
   const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
   q.resize(rows(shape().positions));
@@ -125,8 +131,7 @@ void BatchOf<Real>::Data::check_count(const char* what, std::size_t found, Index
 }
 
 template <class Real>
-void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities,
-                                InstanceStepper& alone) {
+void BatchOf<Real>::Data::place(std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) const {
   alone.forget();
   std::ranges::copy(positions, alone.state().q.flat().begin());
   plan.put_positions(0, alone.state().q.flat());
@@ -134,6 +139,12 @@ void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> position
   for (std::size_t k = 0; k < velocities.size(); ++k) {
     if (!std::isfinite(velocities[k])) throw InputError(fmt::format("velocity \"{}\" is {}", model->names.velocity[k], velocities[k]));
   }
+}
+
+template <class Real>
+void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities,
+                                InstanceStepper& alone) {
+  place(positions, velocities, alone);
   if (!mass.empty()) {
     Field<double, 10>& inertia = alone.own_constants().inertia;
     for (Index slot = 0; slot < inertia.rows(); ++slot) {

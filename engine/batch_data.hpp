@@ -3,7 +3,6 @@
 #pragma once
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
@@ -33,6 +32,7 @@ struct BatchOf<Real>::Data {
   };
 
   std::shared_ptr<const Model> model;
+  std::uint64_t model_hash;  // takes as long as some steps of an instance
   BodyConstants<Real> constants;
   Options options;
   std::int64_t size, blocks;
@@ -42,8 +42,8 @@ struct BatchOf<Real>::Data {
   EffectPlan plan;
   Numbers<Real> q, p, applied, mass, gravity, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
   Numbers<std::uint32_t> past;
+  std::vector<Index> first_child, child_list;  // see children
   std::vector<InstanceRecord> records;
-  oneapi::tbb::global_control allowed;  // more threads than cores are the user's choice
   mutable oneapi::tbb::task_arena arena;
   mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
 
@@ -56,12 +56,17 @@ struct BatchOf<Real>::Data {
   Block<Real> block(std::int64_t b);
   Worker& worker() const;  // of the thread that asks
 
-  /// work(block, worker) for every block, on all threads.
+  /// work(k, worker) for every k below `count`, on all threads.
+  template <class Work>
+  void for_each(std::int64_t count, const Work& work) const {
+    arena.execute([&] {
+      oneapi::tbb::parallel_for(std::int64_t{0}, count, [&](std::int64_t k) { work(k, worker()); });
+    });
+  }
+  /// work(block, worker) for every block.
   template <class Work>
   void for_blocks(const Work& work) const {
-    arena.execute([&] {
-      oneapi::tbb::parallel_for(std::int64_t{0}, blocks, [&](std::int64_t b) { work(b, worker()); });
-    });
+    for_each(blocks, work);
   }
 
   /// visit(numbers, rows) of all that is kept of the instances, in the order of a checkpoint.
@@ -111,6 +116,15 @@ struct BatchOf<Real>::Data {
   /// Row i of `to` is what is seen of instance i.
   template <class Number>
   void observe(const Observations& observations, std::span<Number> to);
+  /// The rows of block b; stepped: as BlockStepper::observe has it.
+  template <class Number>
+  void observe(const Observations& observations, std::span<Number> to, std::int64_t b, Worker& mine, bool stepped);
+
+  /// Bodies that hang on one.
+  std::span<const Index> children(Index slot) const {
+    const auto k = static_cast<std::size_t>(slot);
+    return std::span(child_list).subspan(static_cast<std::size_t>(first_child[k]), static_cast<std::size_t>(first_child[k + 1] - first_child[k]));
+  }
 
   Real* mass_row(std::int64_t i, Index slot) {
     return mass.data() + at(i / lanes, shape().slots * kMassRows) + static_cast<std::size_t>(slot * kMassRows * lanes + i % lanes);
@@ -120,6 +134,8 @@ struct BatchOf<Real>::Data {
   void check_count(const char* what, std::size_t found, Index expected) const;
   void check_body(Index slot) const { require_one_of("body", slot, 1, model->tree.bodies()); }
 
+  /// Positions into `alone`, as they are kept. Throws InputError for positions or velocities that make no sense.
+  void place(std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) const;
   void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone);
 };
 

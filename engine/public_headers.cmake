@@ -6,6 +6,7 @@
 # where they stand.
 set(linden_public_headers
   engine/batch.hpp
+  engine/batch_rows.hpp
   engine/drift.hpp
   engine/effects/effect_work.hpp
   engine/effects/passive_watch.hpp
@@ -89,7 +90,7 @@ function(linden_publish target)
   set(copies)
   foreach(header IN LISTS linden_public_headers)
     string(REGEX REPLACE "hpp$" "cpp" code ${header})
-    if(EXISTS ${PROJECT_SOURCE_DIR}/${code} AND NOT code IN_LIST sources)
+    if(EXISTS ${PROJECT_SOURCE_DIR}/${code} AND NOT "${PROJECT_SOURCE_DIR}/${code}" IN_LIST sources)
       message(FATAL_ERROR "${header} is public and ${code} is not in the library: add it there, or take the header off the list")
     endif()
     list(APPEND originals ${PROJECT_SOURCE_DIR}/${header})

@@ -93,6 +93,8 @@ class Simulation {
   /// Generalized forces [nv; N m, N], on top of gravity and the same over every step until they are set anew; empty: none (the default).
   /// Conjugate to the velocities: of a ball or free joint moment, then force, in the body's frame.
   void set_forces(std::span<const double> force);
+  /// As they were set: [nv], or empty.
+  std::span<const double> forces() const { return applied_; }
 
   /// Targets of the servos [rad, m], in the order of Effects::servos, the same over every step until they are set anew. Where the effects
   /// have a table the number goes over it from now on, and NaN gives the servo back to its table; target velocity and feed-forward go on

@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include <latch>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <system_error>
@@ -40,6 +41,16 @@ std::pair<int, int> try_threads(int count) {
   return {static_cast<int>(started.size()), error};
 }
 
+/// oneTBB starts no more threads than the machine has cores unless it is allowed to; of several allowances the least counts, so there is one.
+void allow_threads(int threads) {
+  using oneapi::tbb::global_control;
+  static std::unique_ptr<global_control> allowance;
+  const auto count = static_cast<std::size_t>(threads);
+  if (count <= global_control::active_value(global_control::max_allowed_parallelism)) return;
+  allowance.reset();
+  allowance = std::make_unique<global_control>(global_control::max_allowed_parallelism, count);
+}
+
 }  // namespace
 
 void require_threads(int threads) {
@@ -53,6 +64,7 @@ void require_threads(int threads) {
                                          "allow more (ulimit -u, ulimit -v)",
                                          threads, more + 1, std::generic_category().message(error)));
   }
+  allow_threads(threads);
   known = threads;
 }
 

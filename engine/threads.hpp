@@ -5,7 +5,8 @@
 
 namespace linden {
 
-/// Throws std::runtime_error where the process cannot have so many threads at once. They are tried once; what was found is remembered.
+/// Allows so many threads to be started, more than the machine has cores too. Throws std::runtime_error where the process cannot have them at
+/// once. They are tried once; what was found is remembered.
 void require_threads(int threads);
 
 /// Those that a call from here may use.

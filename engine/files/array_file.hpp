@@ -25,6 +25,8 @@ class ArrayFile {
 
   /// An array [rows, row...] that has no rows yet. columns: what its numbers are called in a table; empty: they are in none.
   virtual void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string> columns) = 0;
+  /// Of the array of numbers added last: what the numbers of a row are called, and their units. Left out where the format has no place for it.
+  virtual void describe(std::span<const std::string> /*names*/, const std::string& /*units*/) {}
   /// An array of so many doubles as the shape says, which is whole from the beginning; it is in no table.
   virtual void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) = 0;
   /// An array [words]. Words are UTF-8.

@@ -92,6 +92,25 @@ class H5File final : public ArrayFile {
                        own(H5Sclose, H5Screate_simple, static_cast<int>(now.size()) - 1, now.data() + 1, nullptr), native, now, chunk[0], room});
   }
 
+  void describe(std::span<const std::string> names, const std::string& units) override {
+    constexpr std::size_t kMostNames = 2000;  // an attribute has 64 KiB
+    const hid_t dataset = arrays_.back().dataset.id();
+    const Handle type = own(H5Tclose, H5Tcopy, H5T_C_S1);
+    call(H5Tset_size, type.id(), H5T_VARIABLE);
+    call(H5Tset_cset, type.id(), H5T_CSET_UTF8);
+    const auto write = [&](const char* attribute, const Handle& space, const std::vector<const char*>& words) {
+      Handle made = own(H5Aclose, H5Acreate2, dataset, attribute, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT);
+      call(H5Awrite, made.id(), type.id(), words.data());
+      finish(made);
+    };
+    write("units", own(H5Sclose, H5Screate, H5S_SCALAR), {units.c_str()});
+    if (names.size() > kMostNames) return;
+    std::vector<const char*> words;
+    for (const std::string& name : names) words.push_back(name.c_str());
+    const hsize_t count = words.size();
+    write("names", own(H5Sclose, H5Screate_simple, 1, &count, nullptr), words);
+  }
+
   void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) override {
     const std::vector<hsize_t> sizes(shape.begin(), shape.end());
     const Handle space = own(H5Sclose, H5Screate_simple, static_cast<int>(sizes.size()), sizes.data(), nullptr);

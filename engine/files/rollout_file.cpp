@@ -33,6 +33,22 @@ void require_length(std::string_view what, std::size_t found, std::size_t expect
   throw std::invalid_argument(fmt::format("a frame with {} numbers of {}; expected {}", found, what, expected));
 }
 
+/// Arrays called as another one is, or as what every file has, are followed by _2.
+std::vector<RecordedArray> distinct(std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed) {
+  std::set<std::string> taken{"time", "energy", "status", "statuses"};
+  for (const FixedArray& array : fixed) {
+    taken.insert(array.name);
+    taken.insert(array.names);
+  }
+  const auto take = [&](const std::string& name) {
+    std::string own = name;
+    for (int k = 2; !taken.insert(own).second; ++k) own = fmt::format("{}_{}", name, k);
+    return own;
+  };
+  for (RecordedArray& array : arrays) array.name = take(array.name);
+  return arrays;
+}
+
 std::vector<std::string> prefixed(const std::string& prefix, std::vector<std::string> names) {
   for (std::string& name : names) name.insert(0, prefix);
   return names;
@@ -60,13 +76,14 @@ struct RolloutFile<Real>::Data {
 template <class Real>
 RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> recorded,
                                const std::vector<FixedArray>& fixed)
-    : data_(new Data{file, instances, std::move(recorded), array_file(file, instances)}) {
+    : data_(new Data{file, instances, distinct(std::move(recorded), fixed), array_file(file, instances)}) {
   constexpr ElementType kReal = std::is_same_v<Real, float> ? ElementType::float32 : ElementType::float64;
   ArrayFile& arrays = *data_->arrays;
   arrays.add_numbers("time", ElementType::float64, {}, {"time"});
   arrays.add_numbers("energy", kReal, {instances}, {"energy"});
   for (const RecordedArray& array : data_->recorded) {
     arrays.add_numbers(array.name, kReal, {instances, std::ssize(array.rows)}, prefixed(array.prefix, array.rows));
+    if (!array.units.empty()) arrays.describe(array.rows, array.units);
   }
   arrays.add_numbers("status", ElementType::uint8, {instances}, {});
   for (const FixedArray& array : fixed) {

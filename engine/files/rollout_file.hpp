@@ -19,8 +19,10 @@
 //   joint_friction_factors  [N, joints]   friction_joints [joints]
 //   gain_factors            [N, servos]   servos [servos]
 //
-// In place of q and v there may be other arrays [F, N, rows], each with its names. All are float32 where the batch is, else float64, which those that do not change always are. F frames
-// of N instances are written one by one as they come; the file appears when it is committed, whole or not at all.
+// In place of q and v and beside them there may be other arrays [F, N, rows], each with its names; an array that has units has names and
+// units as attributes too in h5. A name that another array has is followed by _2. All are float32 where the batch is, else float64, which
+// those that do not change always are. F frames of N instances are written one by one as they come; the file appears when it is committed,
+// whole or not at all.
 //
 // FILE.csv is the same of one instance as a table: the columns time, energy, and those of the arrays; without the status.
 #pragma once
@@ -41,6 +43,7 @@ struct RecordedArray {
   std::string names;              // of the array with the names of its rows
   std::vector<std::string> rows;  // these
   std::string prefix;             // before them in a table
+  std::string units{};            // of its numbers, where they are told
 };
 
 /// Numbers of every instance that stay as they are.

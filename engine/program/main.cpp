@@ -92,6 +92,7 @@ CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
   add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
   add("Output", "--record", run.record, "FILE.csv|npz|h5", "time, energy and what --what says, one row a step");
   add("Output", "--what", texts.what, "LIST", "what is recorded and plotted, with commas; see below");
+  add("Output", "--observe", texts.observe, "LIST", "observations beside it: pose:hand,com,contact:foot; see below");
   add("Output", "--every", texts.every, "K", "record a row every K steps, default 1");
   add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
   add("Output", "--plot", run.plot, "FILE.svg|png", "drift of energy over time, or what --what says");
@@ -103,6 +104,9 @@ CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
       "--what takes positions, velocities, servos (the force of each), forces (of all effects on each coordinate), energies (kinetic,\n"
       "potential, taken and given by each effect) and contacts (points and normal force of each body). Unless told otherwise a table has\n"
       "positions, npz and h5 have positions and velocities, and a plot has the drift of energy. Forces are means over the step before.\n\n"
+      "--observe takes, of link L or joint J: pose:L, position:L, quaternion:L, twist:L, acceleration:L, imu:L, contact:L (points in the\n"
+      "ground, normal force), q:J, v:J, a:J, p:J, target:J; and q, v, a, p, targets, time, energy, com, com_velocity, momentum.\n"
+      "Columns are called NAME.NUMBER: pose:L.x.\n\n"
       "--randomize goes over what a scene says; the seed says what is drawn. See linden rollout --help.\n\n"
       "Examples:\n"
       "  linden run models/scenes/humanoid_drop.yaml --duration 2 --record drop.csv\n"
@@ -135,6 +139,7 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
       "scalar, avx2, avx512 or baseline (SSE2, NEON), if built with it; default: the best there is");
   add("Output", "--record", rollout.record, "FILE.npz|h5", "time, energy, status and what --what says, of all instances");
   add("Output", "--what", texts.what, "LIST", "of positions, velocities (default: both) and energies");
+  add("Output", "--observe", texts.observe, "LIST", "observations beside it: pose:hand,com,imu:head; see linden run --help");
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
   add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
   command->footer(

@@ -111,6 +111,7 @@ template <class Arguments>
 void read_recording_options(const OptionTexts& texts, Arguments& arguments) {
   if (!texts.every.empty()) arguments.every = integer_from("--every", texts.every, "steps between frames, such as 10");
   if (!texts.what.empty()) arguments.what = quantities_from(texts.what);
+  if (!texts.observe.empty()) arguments.observe = observation_names(texts.observe);
 }
 
 void read_randomize_option(const OptionTexts& texts, MotionArguments& motion) {

@@ -16,7 +16,7 @@ namespace linden {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct OptionTexts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      what, shape, dofs, steps, budget, start, density, randomize;
+      what, observe, shape, dofs, steps, budget, start, density, randomize;
 };
 
 void read_run_options(const OptionTexts& texts, RunArguments& run);

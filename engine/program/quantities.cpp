@@ -75,7 +75,38 @@ void require_available(const std::vector<Quantity>& asked, const std::vector<Qua
   }
 }
 
-Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities) : simulation_(simulation), quantities_(std::move(quantities)) {
+std::vector<std::string> observation_names(const std::string& text) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    names.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
+std::optional<Observations> observations_of(const Model& model, const Effects& effects, const std::vector<std::string>& names) {
+  if (names.empty()) return std::nullopt;
+  try {
+    return std::optional<Observations>(std::in_place, model, effects, names);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("--observe: {}", error.what()));
+  }
+}
+
+std::vector<RecordedArray> recorded_observations(const Observations& observations) {
+  std::vector<RecordedArray> arrays;
+  for (const Observed& entry : observations.layout()) {
+    std::string name = entry.name;
+    std::ranges::replace(name, '/', '_');
+    arrays.push_back({name, name + "_names", entry.rows, entry.name + ".", entry.units});
+  }
+  return arrays;
+}
+
+Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities, const std::vector<std::string>& observed)
+    : simulation_(simulation), quantities_(std::move(quantities)),
+      observations_(observations_of(simulation.model(), simulation.effects(), observed)) {
   require_available(quantities_, available(simulation), "the scene");
   const Names& names = simulation.model().names;
   for (const Quantity quantity : quantities_) {
@@ -109,9 +140,12 @@ Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities) : s
       }
     }
   }
+  if (!observations_) return;
+  for (RecordedArray& array : recorded_observations(*observations_)) add(std::nullopt, std::move(array));
+  look();  // refuses accelerations where there are none
 }
 
-void Observer::add(Quantity quantity, RecordedArray array) {
+void Observer::add(std::optional<Quantity> quantity, RecordedArray array) {
   of_array_.push_back(quantity);
   arrays_.push_back(std::move(array));
 }
@@ -141,6 +175,13 @@ std::span<const std::span<const double>> Observer::look() {
         numbers_.push_back(std::move(force));
         break;
       }
+    }
+  }
+  if (observations_) {
+    std::vector<double> row(static_cast<std::size_t>(observations_->width()));
+    observations_->observe(simulation_, row);
+    for (const Observed& entry : observations_->layout()) {
+      numbers_.emplace_back(row.begin() + entry.offset, row.begin() + entry.offset + entry.width);
     }
   }
   views_.assign(numbers_.begin(), numbers_.end());

@@ -37,16 +37,19 @@ Outputs checked_outputs(const RolloutArguments& arguments) {
   if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
   if (arguments.every != 1 && arguments.record.empty()) throw InputError("--every thins what --record writes: give a --record file too");
   if (!arguments.what.empty() && arguments.record.empty()) throw InputError("--what says what --record takes: give a --record file too");
+  if (!arguments.observe.empty() && arguments.record.empty()) {
+    throw InputError("--observe says what --record takes beside --what: give a --record file too");
+  }
   require_available(arguments.what, {Quantity::positions, Quantity::velocities, Quantity::energies}, "a rollout");
   return {{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
 }
 
-/// Refuses more instances than this machine's memory holds, with what is computed of all of them at once.
+/// Refuses more instances than this machine's memory holds, with what is computed of all of them at once. observed: numbers of each.
 template <class Real>
-void check_instances(const RolloutArguments& arguments, const Shape& shape) {
+void check_instances(const RolloutArguments& arguments, const Shape& shape, double observed) {
   const double nq = shape.positions, nv = shape.velocities;
   double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
-  if (!arguments.record.empty()) numbers += nq + nv;
+  if (!arguments.record.empty()) numbers += nq + nv + 2 * observed;
   if (arguments.randomization.masses) numbers += (arguments.record.empty() ? 11.0 : 13.0) * shape.slots;
   const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
   require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
@@ -61,6 +64,7 @@ class RolloutExecution {
       : arguments_(arguments),
         model_(std::move(model)),
         effects_(arguments.effects()),
+        observations_(observations_of(*model_, effects_, arguments.observe)),
         batch_(scene_of(arguments, *model_), arguments.instances, arguments.computed) {
     figures_.steps_planned = steps;
     figures_.lanes = batch_.lanes();
@@ -86,6 +90,11 @@ class RolloutExecution {
                          : quantity == Quantity::velocities ? recorded_velocities(names)
                                                             : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
         numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
+      }
+      if (observations_) {
+        for (RecordedArray& array : recorded_observations(*observations_)) arrays.push_back(std::move(array));
+        observed_.resize(static_cast<std::size_t>(arguments.instances * observations_->width()));
+        observe();  // refuses accelerations where there are none
       }
       status_.resize(static_cast<std::size_t>(arguments.instances));
       file_.emplace(arguments.record, arguments.instances, std::move(arrays), drawn.arrays());
@@ -230,10 +239,25 @@ class RolloutExecution {
       status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
     }
     if (file_ && figures_.lost.empty()) {
+      if (observations_) observe();
       const std::vector<std::span<const Real>> arrays(numbers_.begin(), numbers_.end());
       recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, arrays, energy_, status_); });
     }
     looked_at_ = figures_.steps;
+  }
+
+  /// What was asked for beside what_, an array of each behind those.
+  void observe() {
+    batch_.observe(*observations_, std::span<Real>(observed_));
+    const auto width = static_cast<std::size_t>(observations_->width());
+    numbers_.resize(what_.size());
+    for (const Observed& entry : observations_->layout()) {
+      std::vector<Real>& to = numbers_.emplace_back();
+      for (std::size_t at = static_cast<std::size_t>(entry.offset); at < observed_.size(); at += width) {
+        to.insert(to.end(), observed_.begin() + static_cast<std::ptrdiff_t>(at),
+                  observed_.begin() + static_cast<std::ptrdiff_t>(at) + entry.width);
+      }
+    }
   }
 
   void finish() {
@@ -251,19 +275,21 @@ class RolloutExecution {
   const RolloutArguments& arguments_;
   std::shared_ptr<const Model> model_;
   const Effects effects_;
+  const std::optional<Observations> observations_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;
   std::vector<Quantity> what_;              // that is recorded
   std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
-  std::vector<Real> energy_;
+  std::vector<Real> energy_, observed_;
   std::vector<std::uint8_t> status_;
   std::int64_t looked_at_ = -1;
 };
 
 template <class Real>
 int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
-  check_instances<Real>(arguments, model->tree.shape);
+  const std::optional<Observations> observations = observations_of(*model, arguments.effects(), arguments.observe);
+  check_instances<Real>(arguments, model->tree.shape, observations ? static_cast<double>(observations->width()) : 0);
   const Interrupt interrupt;
   RolloutExecution<Real> rollout(arguments, model, steps);
   rollout.steps(interrupt);

@@ -26,6 +26,7 @@ struct RolloutArguments : MotionArguments {
   std::int64_t every = 1;   // steps between recorded frames
   std::string record, json;  // files; empty = none
   std::vector<Quantity> what;  // to record; empty: what is usual
+  std::vector<std::string> observe;  // names of observations beside it
 };
 
 /// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 128 + signal after one. Throws InputError

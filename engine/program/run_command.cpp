@@ -46,6 +46,9 @@ Outputs checked_outputs(const RunArguments& arguments) {
   if (!arguments.what.empty() && arguments.record.empty() && arguments.plot.empty()) {
     throw InputError("--what says what --record and --plot take: give one of them too");
   }
+  if (!arguments.observe.empty() && arguments.record.empty() && arguments.plot.empty()) {
+    throw InputError("--observe says what --record and --plot take beside --what: give one of them too");
+  }
   Outputs outputs{{"--record", arguments.record, {".csv", ".npz", ".h5"}},
                   {"--json", arguments.json, {".json"}},
                   {"--plot", arguments.plot, {".svg", ".png"}},
@@ -101,12 +104,12 @@ class RunExecution {
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
     if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
     if (!arguments.record.empty()) {
-      observer_.emplace(simulation, arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what);
+      observer_.emplace(simulation, arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what, arguments.observe);
       DrawnArrays arrays(arguments.randomization, simulation.model(), simulation.effects(), 1);
       arrays.set(0, drawn);
       file_.emplace(arguments.record, 1, observer_->arrays(), arrays.arrays());
     }
-    if (!arguments.plot.empty() && !arguments.what.empty()) begin_traces();
+    if (!arguments.plot.empty() && !(arguments.what.empty() && arguments.observe.empty())) begin_traces();
   }
 
   void steps(const Interrupt& interrupt) {
@@ -174,11 +177,14 @@ class RunExecution {
   }
 
   void begin_traces() {
-    if (!observer_) observer_.emplace(simulation_, arguments_.what);
+    if (!observer_) observer_.emplace(simulation_, arguments_.what, arguments_.observe);
     constexpr std::size_t kMostRows = 64;  // kept; what is drawn of them says run_charts
     for (std::size_t k = 0; k < observer_->arrays().size(); ++k) {
       const RecordedArray& array = observer_->arrays()[k];
-      QuantityTrace& trace = figures_.traces.emplace_back(QuantityTrace{observer_->quantity_of_array()[k], array.name, array.rows, array.rows.size(), {}});
+      const std::optional<Quantity> quantity = observer_->quantity_of_array()[k];
+      if (quantity && arguments_.what.empty()) continue;  // recorded because it is usual
+      traced_.push_back(k);
+      QuantityTrace& trace = figures_.traces.emplace_back(QuantityTrace{quantity, array.name, array.units, array.rows, array.rows.size(), {}});
       trace.rows.resize(std::min(kMostRows, trace.all));
       trace.points.resize(trace.rows.size());
     }
@@ -211,7 +217,7 @@ class RunExecution {
       const auto numbers = observer_->look();
       for (std::size_t k = 0; k < figures_.traces.size(); ++k) {
         std::vector<std::vector<plot::Point>>& rows = figures_.traces[k].points;
-        for (std::size_t row = 0; row < rows.size(); ++row) trace(rows[row], {simulation_.time(), numbers[k][row]});
+        for (std::size_t row = 0; row < rows.size(); ++row) trace(rows[row], {simulation_.time(), numbers[traced_[k]][row]});
       }
     } else if (!arguments_.plot.empty()) {
       // what effects took is still in the account, what they gave is not
@@ -235,6 +241,7 @@ class RunExecution {
   EffectWork work_before_ = simulation_.effect_work();
   RunFigures figures_;
   std::optional<Observer> observer_;  // of what is recorded or plotted
+  std::vector<std::size_t> traced_;   // arrays of it that are plotted
   std::optional<RolloutFile<double>> file_;
   std::int64_t last_sample_ = -1, last_record_ = -1, next_sample_ = 0;
   std::vector<std::string> written_;

@@ -22,6 +22,7 @@ struct RunArguments : MotionArguments {
   Options options;
   std::string record, json, plot, save, load;  // files; empty = none
   std::vector<Quantity> what;                  // to record and to plot; empty: what is usual
+  std::vector<std::string> observe;            // names of observations beside it
   std::int64_t every = 1;                      // steps between recorded rows
 };
 

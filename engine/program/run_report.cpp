@@ -252,7 +252,8 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
 
 /// With its unit; of a quantity of several kinds of joints there are two.
 std::string axis_label(const QuantityTrace& trace) {
-  switch (trace.quantity) {
+  if (!trace.quantity) return fmt::format("{} [{}]", trace.array, trace.units);
+  switch (*trace.quantity) {
     case Quantity::positions: return "positions [rad, m]";
     case Quantity::velocities: return "velocities [rad/s, m/s]";
     case Quantity::servos: return "forces of servos [N m, N]";

@@ -16,8 +16,8 @@ namespace linden {
 
 /// Rows of an array over time, the first few.
 struct QuantityTrace {
-  Quantity quantity;
-  std::string array;
+  std::optional<Quantity> quantity;  // none: an observation
+  std::string array, units;
   std::vector<std::string> rows;                 // their names
   std::size_t all = 0;                           // rows that there are
   std::vector<std::vector<plot::Point>> points;  // of each

@@ -17,9 +17,8 @@ BatchObserver<Real>::BatchObserver(std::shared_ptr<const ObservationSchedule> sc
           make_block_observer(instructions, ObserverSetup<Real>{setup.model.tree, setup.constants, *schedule_, setup.options.gravity})) {
   const auto room = [&](bool asked, Index rows) { return asked ? static_cast<std::size_t>(rows * lanes_) : 0; };
   const Index nv = setup.model.tree.shape.velocities;
-  const bool reads = schedule_->velocities || schedule_->energy;  // the two are found together
-  v_.resize(room(reads, nv));
-  energy_.resize(room(reads, 2));
+  v_.resize(room(schedule_->velocities || schedule_->energy, nv));  // kinetic energy is that of the velocities
+  energy_.resize(room(schedule_->energy, 2));
   a_.resize(room(schedule_->accelerations, nv));
   targets_.resize(room(schedule_->targets, static_cast<Index>(setup.plan.effects.servos.size())));
   time_.resize(room(true, 1));
@@ -49,16 +48,17 @@ void BatchObserver<Real>::read_targets(const Block<Real>& block) {
 }
 
 template <class Real>
-std::span<const Real> BatchObserver<Real>::observe(const Block<Real>& block, BlockStepper<Real>& stepper) {
+std::span<const Real> BatchObserver<Real>::observe(const Block<Real>& block, BlockStepper<Real>& stepper, bool stepped) {
   for (int l = 0; l < block.count; ++l) {
     time_[static_cast<std::size_t>(l)] = static_cast<Real>(static_cast<double>(block.instances[l].steps) * setup_.options.step);
   }
-  if (!v_.empty()) stepper.observe(block, v_.data(), energy_.data());
+  if (!v_.empty()) stepper.observe(block, v_.data(), schedule_->energy ? energy_.data() : nullptr, stepped);
   if (schedule_->accelerations) read_accelerations(block);
   if (schedule_->targets) read_targets(block);
   observer_->observe({.q = block.q,
                       .v = v_.data(),
                       .a = a_.data(),
+                      .p = block.p,
                       .targets = targets_.data(),
                       .time = time_.data(),
                       .energy = energy_.data(),

@@ -19,8 +19,8 @@ class BatchObserver {
   BatchObserver(std::shared_ptr<const ObservationSchedule> schedule, const BlockSetup<Real>& setup, Instructions instructions);
 
   const ObservationSchedule* schedule() const { return schedule_.get(); }
-  /// Rows [width][lane] of a block, which last until the next. `stepper` reads its velocities.
-  std::span<const Real> observe(const Block<Real>& block, BlockStepper<Real>& stepper);
+  /// Rows [width][lane] of a block, which last until the next. `stepper` reads its velocities; stepped: as BlockStepper::observe has it.
+  std::span<const Real> observe(const Block<Real>& block, BlockStepper<Real>& stepper, bool stepped);
 
  private:
   void read_accelerations(const Block<Real>& block);

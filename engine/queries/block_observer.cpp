@@ -7,8 +7,8 @@
 
 namespace linden {
 
-void require_same_model(const ObservationSchedule& schedule, const Model& model) {
-  if (model.hash() == schedule.model_hash) return;
+void require_same_model(const ObservationSchedule& schedule, const Model& model, std::uint64_t model_hash) {
+  if (model_hash == schedule.model_hash) return;
   throw InputError(fmt::format("observations of another model were asked of {}; expected those made for it", quoted(model.names.model)));
 }
 

@@ -17,6 +17,7 @@ struct ObservedBlock {
   const Real* q = nullptr;        // [nq]
   const Real* v = nullptr;        // [nv]
   const Real* a = nullptr;        // [nv]
+  const Real* p = nullptr;        // [nv]
   const Real* targets = nullptr;  // [servos]
   const Real* time = nullptr;     // [1]
   const Real* energy = nullptr;   // [2]
@@ -47,7 +48,7 @@ template <Instructions>
 std::unique_ptr<BlockObserver<float>> make_block_observer(const ObserverSetup<float>& setup);
 
 /// Throw InputError for another model or other servos than the schedule was made for.
-void require_same_model(const ObservationSchedule& schedule, const Model& model);
+void require_same_model(const ObservationSchedule& schedule, const Model& model, std::uint64_t model_hash);
 void require_same_servos(const ObservationSchedule& schedule, std::size_t servos);
 
 /// With these instructions.

@@ -68,6 +68,7 @@ class LaneObserver final : public BlockObserver<typename ElementOf<Pack>::type> 
       case Look::positions: return copy(block.q, look, to);
       case Look::velocities: return copy(block.v, look, to);
       case Look::accelerations: return copy(block.a, look, to);
+      case Look::momenta: return copy(block.p, look, to);
       case Look::targets: return copy(block.targets, look, to);
       case Look::time: return copy(block.time, look, to);
       case Look::energy: return copy(block.energy, look, to);

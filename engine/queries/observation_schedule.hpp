@@ -14,7 +14,7 @@
 namespace linden {
 
 enum class Look : std::uint8_t {
-  positions, velocities, accelerations, targets, time, energy,                  // rows as they are
+  positions, velocities, accelerations, momenta, targets, time, energy,         // rows as they are
   centre_of_mass, centre_of_mass_velocity, momentum,                            // of all bodies
   pose, position, quaternion, twist, acceleration, imu, contact,                // of a link
 };

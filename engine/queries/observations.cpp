@@ -32,6 +32,7 @@ constexpr std::array kKinds{
     ObservedKind{"q", Look::positions, joint_if_named, 0, "rad, m, 1", ""},
     ObservedKind{"v", Look::velocities, joint_if_named, 0, "rad/s, m/s", ""},
     ObservedKind{"a", Look::accelerations, joint_if_named, 0, "rad/s^2, m/s^2", ""},
+    ObservedKind{"p", Look::momenta, joint_if_named, 0, "kg m^2/s, kg m/s", ""},
     ObservedKind{"targets", Look::targets, none, 0, "rad, m", ""},
     ObservedKind{"target", Look::targets, joint, 1, "rad, m", ""},
     ObservedKind{"time", Look::time, none, 1, "s", "time"},
@@ -123,7 +124,7 @@ class Compiler {
   std::vector<Observed> layout;
 
  private:
-  /// Rows of positions, velocities, accelerations or targets: of a joint, or all.
+  /// Rows of positions, velocities, accelerations, momenta or targets: of a joint, or all.
   void choose_rows(ScheduledLook& look, const std::string& joint, Observed& entry) {
     const Names& names = model_.names;
     if (look.what == Look::targets) {
@@ -166,7 +167,8 @@ class Compiler {
       schedule_.accelerations = schedule_.accelerations || depth >= MotionDepth::accelerations;
     };
     switch (look.what) {
-      case Look::positions: break;
+      case Look::positions:
+      case Look::momenta: break;
       case Look::velocities: schedule_.velocities = true; break;
       case Look::accelerations: schedule_.accelerations = true; break;
       case Look::targets: schedule_.targets = true; break;
@@ -244,7 +246,7 @@ void Observations::observe(Simulation& simulation, std::span<double> to) {
     throw InputError(fmt::format("observations: room for {} numbers given, expected {}", to.size(), width_));
   }
   if (model_ != &model || !observer_) {
-    require_same_model(schedule, model);
+    require_same_model(schedule, model, model.hash());
     observer_ = make_block_observer<Instructions::scalar>(
         ObserverSetup<double>{model.tree, model.constants, schedule, simulation.options().gravity});
     model_ = &model;
@@ -259,8 +261,8 @@ void Observations::observe(Simulation& simulation, std::span<double> to) {
     const Energy now = simulation.energy();
     energy = {now.kinetic, now.potential};
   }
-  observer_->observe({.q = simulation.positions().data(), .v = v.data(), .a = a.data(), .targets = targets.data(), .time = &time,
-                      .energy = energy.data()},
+  observer_->observe({.q = simulation.positions().data(), .v = v.data(), .a = a.data(), .p = simulation.momenta().data(),
+                      .targets = targets.data(), .time = &time, .energy = energy.data()},
                      to.data());
 }
 

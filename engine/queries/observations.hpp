@@ -12,7 +12,8 @@
 //
 //   name                  width   numbers
 //   q, v, a               nq, nv  positions, velocities (engine/VELOCITY.md), accelerations (Simulation::accelerations) of all joints
-//   q:J, v:J, a:J                 of joint J
+//   p                     nv      discrete momenta of all joints (engine/VELOCITY.md)
+//   q:J, v:J, a:J, p:J            of joint J
 //   targets, target:J             of all servos in the order of Effects::servos, of that of joint J [rad, m]
 //   time                  1       [s]
 //   energy                2       kinetic, potential [J]

@@ -4,7 +4,8 @@
 //
 //   h f = S^T (F+ - F-) / h - h Q(q1)      F+ h x momenta of the subtrees in the step q1 -> q2 at its beginning, F- in q0 -> q1 at its end
 //
-// A simulation that is given f by set_forces at q1 and has come from q0 goes on to q2, to the tolerance of its solver.
+// At q1 half of the force of the step before acts and half of that of the step after. A simulation that has come from q0 under the force f0 and
+// is given 2 f - f0 by set_forces at q1 goes on to q2, to the tolerance of its solver; where f stays the same from step to step that is f.
 #pragma once
 
 #include "engine/queries/kinematics.hpp"

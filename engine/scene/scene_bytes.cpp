@@ -45,13 +45,23 @@ class ModelCheck {
     each_field(model_.attributes, [](double value) { return !std::isnan(value); });
     check_names();
     check_mimics();
-    for (const BodyShape& shape : model_.shapes) require(moves(shape.slot), "a shape of a body that there is not");
-    for (const BodyShape& shape : model_.welded.shapes) require(shape.slot == 0, "a fixed shape on a body that moves");
+    for (const BodyShape& shape : model_.shapes) {
+      require(moves(shape.slot), "a shape of a body that there is not");
+      check_place(shape.pose);
+    }
+    for (const BodyShape& shape : model_.welded.shapes) {
+      require(shape.slot == 0, "a fixed shape on a body that moves");
+      check_place(shape.pose);
+    }
   }
 
  private:
   void require(bool holds, const char* what) const {
     if (!holds) throw InputError(fmt::format("{}: the bytes hold {}; expected a model that to_bytes wrote; write it again", name_, what));
+  }
+  void check_place(const Pose& pose) const {
+    const auto is_finite = [](double number) { return std::isfinite(number); };
+    require(std::ranges::all_of(pose.rotation, is_finite) && std::ranges::all_of(pose.shift, is_finite), "a place that is not finite");
   }
   bool moves(Index slot) const { return slot > 0 && slot < tree_.shape.slots; }
 
@@ -83,7 +93,10 @@ class ModelCheck {
     require(count(names.body) == tree_.shape.slots && count(names.joint) == tree_.shape.slots, "another number of names than of bodies");
     require(count(names.position) == tree_.shape.positions, "another number of names than of positions");
     require(count(names.velocity) == tree_.shape.velocities, "another number of names than of velocities");
-    for (const auto& [link, place] : names.link) require(place.slot == 0 || moves(place.slot), "a link on a body that there is not");
+    for (const auto& [link, place] : names.link) {
+      require(place.slot == 0 || moves(place.slot), "a link on a body that there is not");
+      check_place(place.in_body);
+    }
     for (const auto& [joint, slot] : names.slot_of_joint) require(moves(slot), "a joint of a body that there is not");
   }
   void check_mimics() const {

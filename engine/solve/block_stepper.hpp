@@ -45,8 +45,9 @@ class BlockStepper {
   /// `steps` steps of every instance that is not frozen.
   virtual void step(const Block<Real>& block, std::int64_t steps) = 0;
 
-  /// velocities [nv] and energy [2] (kinetic, potential [J]) of every instance, rows [row][lane].
-  virtual void observe(const Block<Real>& block, Real* velocities, Real* energy) = 0;
+  /// velocities [nv] and energy [2] (kinetic, potential [J]; null: not asked for) of every instance, rows [row][lane]. stepped: this block
+  /// was the last to be stepped here, and nothing of it was written since, so what its last step left need not be found anew.
+  virtual void observe(const Block<Real>& block, Real* velocities, Real* energy, bool stepped) = 0;
 };
 
 /// The model's constants in the precision of the lanes, and how to step. Both must outlive the steppers.

@@ -55,27 +55,33 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     sweeps_.store(block);
   }
 
-  void observe(const Block<Real>& block, Real* velocities, Real* energy) override {
-    sweeps_.load(block);
+  void observe(const Block<Real>& block, Real* velocities, Real* energy, bool stepped) override {
+    if (!stepped) sweeps_.load(block);
     bool alone = !model_.mimics.empty();
     if constexpr (kEffects) alone = alone || !sweeps_.effects().plan().curves.empty();
     if (alone) return observe_alone(block, velocities, energy);
-    const Pack potential = sweeps_.refresh();
+    if (!stepped && energy != nullptr) sweeps_.refresh();
+    if (!stepped && energy == nullptr) sweeps_.place();
+    if (energy != nullptr) L::store(sweeps_.potential(), energy + W);
     sweeps_.read_velocity();
-    Pack kinetic = number(0);
-    for (Index row = 0; row < tree_.shape.velocities; ++row) {
-      kinetic = kinetic + number(0.5) * sweeps_.p()(row) * work_.increment(row);
-    }
+    if (energy != nullptr) L::store(kinetic_energy(), energy);
     if constexpr (kEffects) sweeps_.effects().follow_motion(block, number(1 / options_.step), work_.increment);
     for (Index row = 0; row < tree_.shape.velocities; ++row) L::store(work_.increment(row), velocities + row * W);
-    L::store(kinetic, energy);
-    L::store(potential, energy + W);
   }
 
  private:
   static constexpr int kWords = kHistoryWords<Real> * W;
 
   static Pack number(double value) { return Pack(static_cast<Real>(value)); }
+
+  /// Of the velocities that were read.
+  Pack kinetic_energy() {
+    Pack kinetic = number(0);
+    for (Index row = 0; row < tree_.shape.velocities; ++row) {
+      kinetic = kinetic + number(0.5) * sweeps_.p()(row) * work_.increment(row);
+    }
+    return kinetic;
+  }
 
   /// Row of the displacement that the last ones lead to.
   static Pack extrapolated(const Block<Real>& block, Index row) {
@@ -173,6 +179,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
       take_out(block, l);
       const Energy seen = alone_.observe();
       for (Index row = 0; row < tree_.shape.velocities; ++row) velocities[row * W + l] = static_cast<Real>(alone_.rate()(row));
+      if (energy == nullptr) continue;
       energy[l] = static_cast<Real>(seen.kinetic);
       energy[W + l] = static_cast<Real>(seen.potential);
     }

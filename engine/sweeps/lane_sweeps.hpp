@@ -7,6 +7,7 @@
 //   evaluate         correct_down                     second half of a solve, corrected displacements, momenta
 //                    innovation_up (or newton_up)     residual, first half of the next solve
 //   end              advance_down, momentum_up        new positions, placements, forces, momenta
+//   read_velocity    mass_solve_up, rate_down         velocities of the momenta, where they are asked for
 //
 // Without effects the Jacobian is factored to first order at the guess, exactly at every second correction, and what lanes that are done have
 // found is kept aside while others go on. With effects the factor is exact and fresh at every evaluation, so that lanes that wait for
@@ -21,6 +22,7 @@
 #include "engine/solve/judge.hpp"
 #include "kernels/block/advance_down.hpp"
 #include "kernels/block/lane_constants.hpp"
+#include "kernels/block/mass_solve_up.hpp"
 #include "kernels/effects/law.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/innovation_up.hpp"
@@ -102,13 +104,19 @@ class LaneSweeps {
     if constexpr (kEffects) effects_.store(block);
   }
 
-  /// Placements and forces of the positions as they are; returns the potential energy. The same instructions as at the end of a step, so
-  /// that it does not matter how many steps are taken in one go.
-  Pack refresh() {
-    advance(L::mask(0));
-    const Pack potential = update_momentum(L::mask(0));
-    if constexpr (kEffects) return potential + effects_.refresh(work_.placement, q_);
-    return potential;
+  /// Placements of the positions as they are.
+  void place() { advance(L::mask(0)); }
+  /// Placements and forces of the positions as they are. The same instructions as at the end of a step, so that it does not matter how
+  /// many steps are taken in one go.
+  void refresh() {
+    place();
+    update_momentum(L::mask(0));
+    if constexpr (kEffects) effects_.refresh(work_.placement, q_);
+  }
+  /// Potential energy, after refresh or the end of a step.
+  Pack potential() {
+    if constexpr (kEffects) return of_gravity_ + effects_.refresh(work_.placement, q_);
+    return of_gravity_;
   }
 
   void find_target() { momentum_target_map(tree_, number(options_.step), p_, work_.force, work_.momentum_target); }
@@ -177,10 +185,9 @@ class LaneSweeps {
   void read_velocity() {
     if constexpr (kEffects) {
       effects_->begin_reading(p_);
-      effects_->with_reading([&](const auto& added) { factor_mass(added); });
-      apply_mass_inverse(p_, work_.increment);
+      effects_->with_reading([&](const auto& added) { find_rate(added); });
     } else {
-      solve_mass(p_, work_.increment);
+      find_rate(NothingAdded{});
     }
   }
 
@@ -229,15 +236,21 @@ class LaneSweeps {
       advance_down<false>(tree_, constants_, gravity_, moves, work_, q_);
     }
   }
-  Pack update_momentum(const Mask& moves) {
+  void update_momentum(const Mask& moves) {
     const Pack h = number(options_.step);
-    if (has_gravity_) return momentum_up<true>(tree_, constants_, h, moves, applied(), work_, p_);
-    return momentum_up<false>(tree_, constants_, h, moves, applied(), work_, p_);
+    of_gravity_ = has_gravity_ ? momentum_up<true>(tree_, constants_, h, moves, applied(), work_, p_)
+                               : momentum_up<false>(tree_, constants_, h, moves, applied(), work_, p_);
   }
 
   template <class Added>
   [[gnu::noinline]] void factor_mass(const Added& added) {
     articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, gains(), added);
+  }
+  template <class Added>
+  [[gnu::noinline]] void find_rate(const Added& added) {
+    mass_solve_up(tree_, constants_, work_.placement, p_, work_.articulated, work_.gain_down, work_.joint_inverse, work_.bias,
+                  work_.innovation, added);
+    rate_down(tree_, constants_, work_.placement, gains(), work_.innovation, work_.variation, work_.increment);
   }
   [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
     impulse_pass_up(tree_, constants_, work_.placement, gains(), right_side, work_.bias, work_.innovation);
@@ -265,6 +278,7 @@ class LaneSweeps {
   Vec3<Pack> gravity_;
   Pack fall_per_mass_;
   Pack tolerance_squared_;
+  Pack of_gravity_;  // potential energy
   Workspace<Pack> work_;
   Kept<Pack> kept_;  // empty with effects
   Field<Pack> q_, p_, applied_;

@@ -100,8 +100,8 @@ TEST_CASE("the picture of a scaling names its axes and every solver", "[command 
 
 TEST_CASE("the picture of a scaling names the sizes that failed, and its slope has an error", "[command line]") {
   const Shell shell;
-  // a chain of 50 fails in its second step, where one of a single link does not
-  REQUIRE(shell.linden("scaling --dofs 1..50 --steps 20 --dt 0.4 --spread 4 --plot a.svg").exit_code == 0);
+  // a chain of 50 fails in its second step, shorter ones after the tenth at the earliest
+  REQUIRE(shell.linden("scaling --dofs 1..50 --steps 4 --dt 0.4 --spread 4 --plot a.svg").exit_code == 0);
   CHECK_THAT(text_of(shell / "a.svg"), Contains("newton, slope ") && Contains(" \u00b1 ") && Contains(", failed at ") && Contains("50 DOFs;"));
 }
 

@@ -14,6 +14,7 @@ std::string_view name(Check check) {
     case Check::rest: return "rest";
     case Check::velocity: return "velocity";
     case Check::bits: return "bits";
+    case Check::observations: return "observations";
   }
   return "";
 }
@@ -29,6 +30,7 @@ std::vector<Difference> differences(const EverydayScene& scene, std::optional<Ch
   }
   if (found.asked(Check::position)) check_position(scene, found);
   if (found.asked(Check::bits)) check_bits(scene, found);
+  if (found.asked(Check::observations)) check_observations(scene, found);
   return found.list;
 }
 

@@ -12,9 +12,9 @@
 
 namespace linden {
 
-enum class Check : std::uint8_t { refused, position, energy, rest, velocity, bits };
-inline constexpr std::array<Check, 6> kChecks{Check::refused, Check::position, Check::energy,
-                                              Check::rest,    Check::velocity, Check::bits};
+enum class Check : std::uint8_t { refused, position, energy, rest, velocity, bits, observations };
+inline constexpr std::array<Check, 7> kChecks{Check::refused,  Check::position, Check::energy,      Check::rest,
+                                              Check::velocity, Check::bits,     Check::observations};
 
 std::string_view name(Check check);
 

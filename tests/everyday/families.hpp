@@ -32,5 +32,6 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
 void check_velocities(const EverydayScene& scene, const Walk& walk, Differences& found);
 void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found);
 void check_bits(const EverydayScene& scene, Differences& found);
+void check_observations(const EverydayScene& scene, Differences& found);
 
 }  // namespace linden

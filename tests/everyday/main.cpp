@@ -36,7 +36,7 @@ Asked asked(int argc, char** argv, bool& help) {
   program.add_option("--seed", result.seed, "All scenes follow from it (1)");
   program.add_option("--first", result.first, "Number of the first scene (1)");
   program.add_option("--threads", result.threads, "0: all that the machine has (0)");
-  program.add_option("--only", only, "One check: refused, position, energy, rest, velocity or bits");
+  program.add_option("--only", only, "One check: refused, position, energy, rest, velocity, bits or observations");
   program.add_flag("--verbose", result.verbose, "Tell every scene, also where nothing differs");
   try {
     program.parse(argc, argv);
@@ -51,7 +51,7 @@ Asked asked(int argc, char** argv, bool& help) {
     const auto found = std::ranges::find(kChecks, only, [](Check check) { return name(check); });
     if (found == kChecks.end()) {
       throw InputError(
-          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity or bits", quoted(only)));
+          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity, bits or observations", quoted(only)));
     }
     result.only = *found;
   }
