@@ -240,6 +240,10 @@ void BatchOf<Real>::set_mass(std::int64_t i, Index slot, double mass) {
     throw InputError(fmt::format("instance {}, body \"{}\" has no mass, of which its inertia would follow; expected set_inertia", i,
                                  model().names.body[static_cast<std::size_t>(slot)]));
   }
+  if (!(mass > 0) || !std::isfinite(mass)) {
+    throw InputError(fmt::format("instance {}, body \"{}\": a mass of {} kg is given; expected one above zero", i,
+                                 model().names.body[static_cast<std::size_t>(slot)], mass));
+  }
   const double factor = mass / numbers[0];
   for (double& number : numbers) number *= factor;
   numbers[0] = mass;

@@ -156,8 +156,8 @@ class BatchOf {
   /// call for. Throws InputError for an inertia that is not positive definite.
   void set_inertia(std::int64_t i, Index slot, const std::array<double, 10>& inertia);
   std::array<double, 10> inertia(std::int64_t i, Index slot) const;
-  /// The same of a mass [kg] alone: first moment and inertia go with it, the centre of mass stays. Throws InputError too where the body has
-  /// no mass so far.
+  /// The same of a mass [kg] alone: first moment and inertia go with it, the centre of mass stays. Throws InputError too for a mass
+  /// that is not above zero, and where the body has none so far.
   void set_mass(std::int64_t i, Index slot, double mass);
 
   /// All that the batch depends on (positions and momenta, what was set of each instance, records), so that what goes on from it is the same

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <thread>
 
+#include "engine/scene/load_model.hpp"
 #include "engine/threads.hpp"
 #include "layout/support/input_error.hpp"
 
@@ -62,6 +63,10 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
   }
   blocks = (size + lanes - 1) / lanes;
   const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
+  const double numbers = shape().positions + (plan.any() ? 4.0 : 1.0) * shape().velocities + plan.kept();
+  const double words = static_cast<double>(kHistoryWords<Real>) * shape().velocities;
+  const double each = numbers * sizeof(Real) + words * sizeof(std::uint32_t) + sizeof(InstanceRecord);
+  require_memory(fmt::format("{} instances", size), each * static_cast<double>(size));
   q.resize(rows(shape().positions));
   p.resize(rows(shape().velocities));
   past.resize(rows(shape().velocities * kHistoryWords<Real>));

@@ -16,14 +16,6 @@ namespace {
 
 constexpr std::int64_t kInstances = 11;  // no multiple of any number of lanes
 
-std::vector<Instructions> all_instructions() {
-  std::vector<Instructions> list;
-  for (const Instructions one : {Instructions::scalar, Instructions::baseline, Instructions::avx2, Instructions::avx512}) {
-    if (available(one)) list.push_back(one);
-  }
-  return list;
-}
-
 /// Something else in each row of each instance.
 template <class Real>
 void spread(const BatchView<Real>& rows, double low, double high) {

@@ -13,6 +13,7 @@
 #include "models/build/builder.hpp"
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
+#include "tests/engine/scenes.hpp"
 
 namespace linden {
 namespace {
@@ -21,14 +22,6 @@ using SharedModel = std::shared_ptr<const Model>;
 
 SharedModel shared(Model model) { return std::make_shared<const Model>(std::move(model)); }
 Model own_model(const char* file, Base base) { return load_urdf(std::string(LINDEN_MODELS_DIR) + "/" + file, base); }
-
-std::vector<Instructions> all_instructions() {
-  std::vector<Instructions> list;
-  for (const Instructions one : {Instructions::scalar, Instructions::baseline, Instructions::avx2, Instructions::avx512}) {
-    if (available(one)) list.push_back(one);
-  }
-  return list;
-}
 
 template <class Batch>
 void start(Batch& batch, std::int64_t i, std::uint64_t seed, double spread) {

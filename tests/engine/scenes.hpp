@@ -9,6 +9,7 @@
 
 #include "engine/initial_state.hpp"
 #include "engine/simulation.hpp"
+#include "engine/solve/instructions.hpp"
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 
@@ -33,6 +34,15 @@ inline std::vector<std::string> all_robots() {
   }
   std::sort(files.begin(), files.end());
   return files;
+}
+
+/// Instructions that this processor has and this build knows.
+inline std::vector<Instructions> all_instructions() {
+  std::vector<Instructions> list;
+  for (const Instructions one : {Instructions::scalar, Instructions::baseline, Instructions::avx2, Instructions::avx512}) {
+    if (available(one)) list.push_back(one);
+  }
+  return list;
 }
 
 inline void random_start(Simulation& simulation, std::uint64_t seed, double spread) {

@@ -141,6 +141,17 @@ CASES: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
     "gains that are below zero": (written("gains", -2.0), ("instance 3", "joint1", "-2")),
     "friction that is below zero": (written("friction", -2.0), ("instance 3", "joint1", "-2")),
     "gravity that is NaN": (written("gravity", NAN), ("instance 3", "gravity", "nan")),
+    "a number of instances that is none": (lambda: linden.Batch("chain:3", 1.5), ("instances", "1.5", "whole")),  # type: ignore[arg-type]
+    "steps that are no whole number": (lambda: batch().step(1.5), ("n", "1.5", "whole")),  # type: ignore[arg-type]
+    "a name that stands alone": (lambda: linden.Batch("chain:3", 2, observe="com"), ("observe", "com", "list")),
+    "a name that stands alone, asked of a simulation": (lambda: chain().observe("com"), ("names", "com", "list")),
+    "targets of another shape": (assigned(batch, "targets", np.zeros((3, 3))), ("targets", "(3,3)", "[5, 3]")),
+    "an instance that there is not": (lambda: batch().set("gravity", [0, 0, 1], which=[9]), ("which", "9", "0 to 4")),
+    "an instance that there is not, to begin again": (lambda: batch().reset([-1]), ("which", "-1", "0 to 4")),
+    "a seed below zero": (lambda: batch().reset(seed=-1), ("seed", "zero or more")),
+    "a start that is not finite": (lambda: batch().reset([2], q=[0, NAN, 0]), ("q", "joint2", "instance 2", "nan", "nothing was reset")),
+    "a mass of zero": (lambda: batch().set("mass:link1", 0.0), ("instance 0", "link1", "0 kg", "above zero")),
+    "a parameter that is misspelled": (lambda: batch().set("frictoin:joint1", 1.0), ("frictoin:joint1", "friction")),
     "a mask of another length": (lambda: batch().reset(np.zeros(4, bool)), ("which", "[4]", "[5]")),
     "instances that are no whole numbers": (lambda: batch().reset([0.5]), ("which", "float64")),
     "an instance that is not there": (lambda: batch().reset([5]), ("5",)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Sequence
 from typing import Any, Unpack
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from . import _core
 from ._core import Model, Observed, Scene
-from .errors import InputError
+from .errors import InputError, name_list, whole_number
 from .scenes import Settings, made_scene
 
 # What a batch takes in by rows, and which names of `set` are columns of it.
@@ -60,11 +61,12 @@ class Batch:
         **settings: Unpack[Settings],
     ) -> None:
         scene = made_scene(model, settings, 2)
+        instances, threads, names = whole_number("instances", instances), whole_number("threads", threads), name_list("observe", observe)
         self._dtype = _precision("dtype", dtype)
         self._observation_dtype = _precision("observation_dtype", dtype if observation_dtype is None else observation_dtype)
         core = _core.Batch64 if self._dtype == np.float64 else _core.Batch32
         self._threads, self._instructions = threads, instructions
-        self._core: Any = core(scene, instances, threads, instructions, list(observe))
+        self._core: Any = core(scene, instances, threads, instructions, names)
         self._rows: dict[str, NDArray[Any]] = {}
         self._observations: NDArray[Any] = np.zeros((instances, self._core.width), self._observation_dtype)
         self._layout = {entry.name: entry for entry in self._core.layout}
@@ -135,7 +137,7 @@ class Batch:
 
     @targets.setter
     def targets(self, value: ArrayLike) -> None:
-        self._rows_of("targets")[...] = value
+        self._write_rows("targets", value)
 
     @property
     def forces(self) -> NDArray[Any]:
@@ -144,7 +146,7 @@ class Batch:
 
     @forces.setter
     def forces(self, value: ArrayLike) -> None:
-        self._rows_of("forces")[...] = value
+        self._write_rows("forces", value)
 
     @property
     def gains(self) -> NDArray[Any]:
@@ -153,7 +155,7 @@ class Batch:
 
     @gains.setter
     def gains(self, value: ArrayLike) -> None:
-        self._rows_of("gains")[...] = value
+        self._write_rows("gains", value)
 
     @property
     def friction(self) -> NDArray[Any]:
@@ -162,7 +164,7 @@ class Batch:
 
     @friction.setter
     def friction(self, value: ArrayLike) -> None:
-        self._rows_of("friction")[...] = value
+        self._write_rows("friction", value)
 
     @property
     def ground_friction(self) -> NDArray[Any]:
@@ -171,7 +173,7 @@ class Batch:
 
     @ground_friction.setter
     def ground_friction(self, value: ArrayLike) -> None:
-        self._rows_of("ground_friction")[...] = value
+        self._write_rows("ground_friction", value)
 
     @property
     def gravity(self) -> NDArray[Any]:
@@ -180,7 +182,7 @@ class Batch:
 
     @gravity.setter
     def gravity(self, value: ArrayLike) -> None:
-        self._rows_of("gravity")[...] = value
+        self._write_rows("gravity", value)
 
     # -- in time
 
@@ -189,7 +191,7 @@ class Batch:
         KeyboardInterrupt ends it between two steps."""
         rows = self._rows
         seen = self._observations if self._observations.size else None
-        self._core.step(n, *[rows.get(name) for name in ROWS], seen)
+        self._core.step(whole_number("n", n), *[rows.get(name) for name in ROWS], seen)
 
     def reset(
         self,
@@ -252,7 +254,7 @@ class Batch:
 
     def ask(self, names: Sequence[str]) -> NDArray[Any]:
         """What is asked for by name of every instance now, beside what `observe` named [N, width]."""
-        return self._core.ask(list(names), self._dtype == np.float32)  # type: ignore[no-any-return]
+        return self._core.ask(name_list("names", names), self._dtype == np.float32)  # type: ignore[no-any-return]
 
     @property
     def status(self) -> NDArray[np.uint8]:
@@ -358,14 +360,19 @@ class Batch:
             self._rows[name] = np.array(self._core.rows(name), self._dtype)
         return self._rows[name]
 
+    def _write_rows(self, name: str, value: ArrayLike) -> None:
+        rows = self._rows_of(name)
+        rows[...] = self._values(name, value, rows.shape)
+
     def _columns(self, name: str) -> tuple[NDArray[Any], int | slice]:
         kind, colon, joint = name.partition(":")
         if not colon and name in ("ground_friction", "gravity"):
             return self._rows_of(name), 0 if name == "ground_friction" else slice(None)
         if kind not in COLUMNS or not colon:
+            near = difflib.get_close_matches(kind, ["mass", "inertia", *COLUMNS, "ground_friction", "gravity"], 1)
             raise InputError(
                 f'parameter "{name}" is not known; expected mass:LINK, inertia:LINK, friction:JOINT, gain:JOINT, target:JOINT, '
-                "force:JOINT, ground_friction or gravity"
+                f"force:JOINT, ground_friction or gravity{f'; did you mean {near[0]}?' if near else ''}"
             )
         return self._rows_of(COLUMNS[kind]), self._core.column(COLUMNS[kind], joint)
 
@@ -379,16 +386,19 @@ class Batch:
             return np.flatnonzero(chosen).astype(np.int64)
         if chosen.size and not np.issubdtype(chosen.dtype, np.integer):
             raise InputError(f"which: numbers of type {chosen.dtype} are given; expected whole numbers of instances, or a mask")
+        beyond = chosen[(chosen < 0) | (chosen >= len(self))]
+        if beyond.size:
+            raise InputError(f"which: there is no instance {beyond.flat[0]}; they go from 0 to {len(self) - 1}")
         return np.ascontiguousarray(chosen.reshape(-1), np.int64)
 
     @staticmethod
     def _seeds(chosen: NDArray[np.int64], seed: int | ArrayLike) -> list[tuple[slice, int]]:
         """Parts of `chosen`, and the number to which the core adds an instance's own for its seed."""
         seeds = np.asarray(seed)
-        if not np.issubdtype(seeds.dtype, np.integer) or seeds.shape not in ((), chosen.shape):
+        if not np.issubdtype(seeds.dtype, np.integer) or seeds.shape not in ((), chosen.shape) or (seeds < 0).any():
             raise InputError(
-                f"seed: {seeds.dtype} of shape {list(seeds.shape)} is given; expected a whole number, or one for each instance, "
-                f"shape [{len(chosen)}]"
+                f"seed: {seeds.dtype} of shape {list(seeds.shape)} is given; expected a whole number, zero or more, or one for each "
+                f"instance, shape [{len(chosen)}]"
             )
         if seeds.ndim == 0:
             return [(slice(None), int(seeds))]
@@ -397,7 +407,15 @@ class Batch:
     def _rows_for(
         self, chosen: NDArray[np.int64], name: str, value: ArrayLike | None, count: int, usual: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        return self._values(name, usual if value is None else value, (len(chosen), count))
+        rows = self._values(name, usual if value is None else value, (len(chosen), count))
+        wrong = np.argwhere(~np.isfinite(rows))
+        if wrong.size:
+            k, row = wrong[0]
+            names = self.model.q_names if name == "q" else self.model.v_names
+            raise InputError(
+                f'{name}: "{names[row]}" of instance {chosen[k]} is {rows[k, row]}; expected a finite number; nothing was reset'
+            )
+        return rows
 
     @staticmethod
     def _values(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

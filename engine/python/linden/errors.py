@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -34,3 +36,18 @@ class InputWarning(UserWarning):
     """What a file or a scene says that was read with a grain of salt, or that does nothing."""
 
     __module__ = "linden"
+
+
+def whole_number(argument: str, value: int) -> int:
+    """The number; an InputError that names the argument for anything else."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise InputError(f"{argument}: {value!r} is given; expected a whole number") from None
+
+
+def name_list(argument: str, names: Sequence[str]) -> list[str]:
+    """The names; an InputError for one that stands alone, which is a sequence of letters, and for what is no text."""
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise InputError(f'{argument}: {names!r} is given; expected a list of names, such as ["q", "pose:hand"]')
+    return list(names)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._core import CentreOfMass, Model, Pose, Scene
-from .errors import InputError
+from .errors import InputError, name_list
 from .scenes import Settings, made_scene
 
 
@@ -74,7 +74,7 @@ class Simulation(_core.Simulation):
 
         out: where to write it [width]. The list is made ready when it is first asked for.
         """
-        key = tuple(names)
+        key = tuple(name_list("names", names))
         seen = self._observations.get(key)
         if seen is None:
             seen = self._observations[key] = _core.Observations(self, list(key))
@@ -89,7 +89,7 @@ class Simulation(_core.Simulation):
             raise InputError(f"steps: {steps} are asked for; expected zero or more")
         if every < 1:
             raise InputError(f"every: {every} is given; expected one step or more")
-        seen = _core.Observations(self, list(names))
+        seen = _core.Observations(self, name_list("names", names))
         frames = np.empty((steps // every + 1, seen.width))
         seen.observe(self, frames[0])
         for frame in frames[1:]:
