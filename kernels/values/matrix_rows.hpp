@@ -22,96 +22,108 @@ inline constexpr int kRowPart = 4;
 #else
 inline constexpr int kRowPart = 2;
 #endif
-using RowPart = double __attribute__((vector_size(sizeof(double) * kRowPart)));
 
-/// Eight numbers in memory, of which six count.
-struct Row8 {
-  static constexpr int kParts = (6 + kRowPart - 1) / kRowPart;
-  RowPart part[kParts];
+/// Eight numbers in memory, of which six count; in registers of kWidth.
+template <int kWidth>
+struct RowOf {
+  typedef double Part __attribute__((vector_size(sizeof(double) * kWidth)));  // GCC 12 forgets the width of `using`
+  static constexpr int kParts = (6 + kWidth - 1) / kWidth;
+  Part part[kParts];
 
-  double operator[](int k) const { return part[k / kRowPart][k % kRowPart]; }
+  double operator[](int k) const { return part[k / kWidth][k % kWidth]; }
 };
+using Row8 = RowOf<kRowPart>;
 
 /// Part by part.
-template <class Action>
-LINDEN_INLINE Row8 row_of(const Action& action) {
-  Row8 row;
-  for (int p = 0; p < Row8::kParts; ++p) row.part[p] = action(p);
+template <int W, class Action>
+LINDEN_INLINE RowOf<W> row_of(const Action& action) {
+  RowOf<W> row;
+  for (int p = 0; p < RowOf<W>::kParts; ++p) row.part[p] = action(p);
   return row;
 }
-LINDEN_INLINE Row8 operator+(const Row8& a, const Row8& b) {
-  return row_of([&](int p) LINDEN_INLINE_LAMBDA { return a.part[p] + b.part[p]; });
+template <int W>
+LINDEN_INLINE RowOf<W> operator+(const RowOf<W>& a, const RowOf<W>& b) {
+  return row_of<W>([&](int p) LINDEN_INLINE_LAMBDA { return a.part[p] + b.part[p]; });
 }
-LINDEN_INLINE Row8 operator-(const Row8& a, const Row8& b) {
-  return row_of([&](int p) LINDEN_INLINE_LAMBDA { return a.part[p] - b.part[p]; });
+template <int W>
+LINDEN_INLINE RowOf<W> operator-(const RowOf<W>& a, const RowOf<W>& b) {
+  return row_of<W>([&](int p) LINDEN_INLINE_LAMBDA { return a.part[p] - b.part[p]; });
 }
-LINDEN_INLINE Row8 operator*(const Row8& a, const Row8& b) {
-  return row_of([&](int p) LINDEN_INLINE_LAMBDA { return a.part[p] * b.part[p]; });
+template <int W>
+LINDEN_INLINE RowOf<W> operator*(const RowOf<W>& a, const RowOf<W>& b) {
+  return row_of<W>([&](int p) LINDEN_INLINE_LAMBDA { return a.part[p] * b.part[p]; });
 }
-LINDEN_INLINE Row8 operator*(double a, const Row8& b) {
-  return row_of([&](int p) LINDEN_INLINE_LAMBDA { return a * b.part[p]; });
+template <int W>
+LINDEN_INLINE RowOf<W> operator*(double a, const RowOf<W>& b) {
+  return row_of<W>([&](int p) LINDEN_INLINE_LAMBDA { return a * b.part[p]; });
 }
-LINDEN_INLINE Row8 operator/(double a, const Row8& b) {
-  return row_of([&](int p) LINDEN_INLINE_LAMBDA { return a / b.part[p]; });
+template <int W>
+LINDEN_INLINE RowOf<W> operator/(double a, const RowOf<W>& b) {
+  return row_of<W>([&](int p) LINDEN_INLINE_LAMBDA { return a / b.part[p]; });
 }
-LINDEN_INLINE Row8& operator+=(Row8& a, const Row8& b) { return a = a + b; }
+template <int W>
+LINDEN_INLINE RowOf<W>& operator+=(RowOf<W>& a, const RowOf<W>& b) {
+  return a = a + b;
+}
 
-struct Rows6 {
-  Row8 r[6];
+template <int kWidth>
+struct Rows6Of {
+  RowOf<kWidth> r[6];
 };
+using Rows6 = Rows6Of<kRowPart>;
 
 /// Room for a Rows6 in memory.
 inline constexpr int kRowNumbers = 48;
 
-LINDEN_INLINE Row8 load_row8(const double* from) {
-  Row8 row;
+template <int W = kRowPart>
+LINDEN_INLINE RowOf<W> load_row8(const double* from) {
+  RowOf<W> row;
   std::memcpy(row.part, from, sizeof row);
   return row;
 }
-LINDEN_INLINE void store_row8(double* to, const Row8& row) { std::memcpy(to, row.part, sizeof row); }
+template <int W>
+LINDEN_INLINE void store_row8(double* to, const RowOf<W>& row) { std::memcpy(to, row.part, sizeof row); }
 /// The same number in every lane.
 LINDEN_INLINE Row8 spread(double x) {
-  return row_of([&](int) LINDEN_INLINE_LAMBDA { return x - RowPart{}; });
-}
-/// Number `at` of a part in all of it. A template, like what follows, as only the shuffles of its own length compile.
-template <int at, class Part>
-LINDEN_INLINE Part spread_part(const Part& from) {
-  constexpr auto length = sizeof(Part) / sizeof(double);
-  if constexpr (length == 8) {
-    return __builtin_shufflevector(from, from, at, at, at, at, at, at, at, at);
-  } else if constexpr (length == 4) {
-    return __builtin_shufflevector(from, from, at, at, at, at);
-  } else {
-    return __builtin_shufflevector(from, from, at, at);
-  }
+  return row_of<kRowPart>([&](int) LINDEN_INLINE_LAMBDA { return x - Row8::Part{}; });
 }
 /// Number k of the row in every lane.
-template <int k>
-LINDEN_INLINE Row8 spread(const Row8& row) {
-  const RowPart all = spread_part<k % kRowPart>(row.part[k / kRowPart]);
-  return row_of([&](int) LINDEN_INLINE_LAMBDA { return all; });
+template <int k, int W>
+LINDEN_INLINE RowOf<W> spread(const RowOf<W>& row) {
+  constexpr int at = k % W;
+  const auto from = row.part[k / W];
+  return row_of<W>([&](int) LINDEN_INLINE_LAMBDA {
+    if constexpr (W == 8) {
+      return __builtin_shufflevector(from, from, at, at, at, at, at, at, at, at);
+    } else if constexpr (W == 4) {
+      return __builtin_shufflevector(from, from, at, at, at, at);
+    } else {
+      return __builtin_shufflevector(from, from, at, at);
+    }
+  });
 }
 /// The six numbers that count.
-LINDEN_INLINE void store_row6(double* to, const Row8& row) { std::memcpy(to, row.part, 6 * sizeof(double)); }
+template <int W>
+LINDEN_INLINE void store_row6(double* to, const RowOf<W>& row) { std::memcpy(to, row.part, 6 * sizeof(double)); }
 
 /// Rows become columns.
-template <class P = RowPart>
-LINDEN_INLINE Rows6 turned_over(const Rows6& a) {
-  constexpr auto length = sizeof(P) / sizeof(double);
-  Rows6 b;
-  if constexpr (length == 8) {
-    const auto low = [](P x, P y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 0, 8, 2, 10, 4, 12, 6, 14); };
-    const auto high = [](P x, P y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 1, 9, 3, 11, 5, 13, 7, 15); };
+template <int W>
+LINDEN_INLINE Rows6Of<W> turned_over(const Rows6Of<W>& a) {
+  using P = typename RowOf<W>::Part;
+  Rows6Of<W> b;
+  if constexpr (W == 8) {
+    const auto low = [](auto x, auto y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 0, 8, 2, 10, 4, 12, 6, 14); };
+    const auto high = [](auto x, auto y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 1, 9, 3, 11, 5, 13, 7, 15); };
     const P low01 = low(a.r[0].part[0], a.r[1].part[0]), low23 = low(a.r[2].part[0], a.r[3].part[0]), low45 = low(a.r[4].part[0], a.r[5].part[0]);
     const P high01 = high(a.r[0].part[0], a.r[1].part[0]), high23 = high(a.r[2].part[0], a.r[3].part[0]),
             high45 = high(a.r[4].part[0], a.r[5].part[0]);
-    const auto first = [](P x, P y, P z) LINDEN_INLINE_LAMBDA {
+    const auto first = [](auto x, auto y, auto z) LINDEN_INLINE_LAMBDA {
       return __builtin_shufflevector(__builtin_shufflevector(x, y, 0, 1, 8, 9, 0, 0, 0, 0), z, 0, 1, 2, 3, 8, 9, 6, 7);
     };
-    const auto second = [](P x, P y, P z) LINDEN_INLINE_LAMBDA {
+    const auto second = [](auto x, auto y, auto z) LINDEN_INLINE_LAMBDA {
       return __builtin_shufflevector(__builtin_shufflevector(x, y, 2, 3, 10, 11, 0, 0, 0, 0), z, 0, 1, 2, 3, 10, 11, 6, 7);
     };
-    const auto third = [](P x, P y, P z) LINDEN_INLINE_LAMBDA {
+    const auto third = [](auto x, auto y, auto z) LINDEN_INLINE_LAMBDA {
       return __builtin_shufflevector(__builtin_shufflevector(x, y, 4, 5, 12, 13, 0, 0, 0, 0), z, 0, 1, 2, 3, 12, 13, 6, 7);
     };
     b.r[0].part[0] = first(low01, low23, low45);
@@ -120,11 +132,11 @@ LINDEN_INLINE Rows6 turned_over(const Rows6& a) {
     b.r[3].part[0] = second(high01, high23, high45);
     b.r[4].part[0] = third(low01, low23, low45);
     b.r[5].part[0] = third(high01, high23, high45);
-  } else if constexpr (length == 4) {
-    const auto low = [](P x, P y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 0, 4, 2, 6); };
-    const auto high = [](P x, P y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 1, 5, 3, 7); };
-    const auto front = [](P x, P y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 0, 1, 4, 5); };
-    const auto back = [](P x, P y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 2, 3, 6, 7); };
+  } else if constexpr (W == 4) {
+    const auto low = [](auto x, auto y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 0, 4, 2, 6); };
+    const auto high = [](auto x, auto y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 1, 5, 3, 7); };
+    const auto front = [](auto x, auto y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 0, 1, 4, 5); };
+    const auto back = [](auto x, auto y) LINDEN_INLINE_LAMBDA { return __builtin_shufflevector(x, y, 2, 3, 6, 7); };
     for (int half = 0; half < 2; ++half) {  // columns 0 to 3, then 4 and 5
       P lows[3], highs[3];
       for (int k = 0; k < 3; ++k) {
@@ -150,9 +162,10 @@ LINDEN_INLINE Rows6 turned_over(const Rows6& a) {
 }
 
 /// Ad_{X^-1}^T applied to columns of wrenches (n; f), X as it lies in a row of placements: n' = R n + p x f', f' = R f.
-LINDEN_INLINE Rows6 mixed(const double* X, const Rows6& a) {
+template <int W>
+LINDEN_INLINE Rows6Of<W> mixed(const double* X, const Rows6Of<W>& a) {
   const double* p = X + 9;
-  Rows6 b;
+  Rows6Of<W> b;
   for (int k = 0; k < 3; ++k) b.r[3 + k] = X[3 * k] * a.r[3] + X[3 * k + 1] * a.r[4] + X[3 * k + 2] * a.r[5];
   for (int k = 0; k < 3; ++k) {
     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
@@ -162,16 +175,18 @@ LINDEN_INLINE Rows6 mixed(const double* X, const Rows6& a) {
 }
 
 /// From and to the order of a Mat6 in memory.
-LINDEN_INLINE Rows6 rows_of(const double* mat6) {
-  Rows6 a;
+template <int W = kRowPart>
+LINDEN_INLINE Rows6Of<W> rows_of(const double* mat6) {
+  Rows6Of<W> a;
   for (int k = 0; k < 6; ++k) {
     const double* row = mat6 + 18 * (k / 3) + 3 * (k % 3);
     const double numbers[8] = {row[0], row[1], row[2], row[9], row[10], row[11], 0, 0};
-    a.r[k] = load_row8(numbers);
+    a.r[k] = load_row8<W>(numbers);
   }
   return a;
 }
-LINDEN_INLINE void to_mat6(const Rows6& a, double* mat6) {
+template <int W>
+LINDEN_INLINE void to_mat6(const Rows6Of<W>& a, double* mat6) {
   for (int k = 0; k < 6; ++k) {
     double* row = mat6 + 18 * (k / 3) + 3 * (k % 3);
     for (int c = 0; c < 3; ++c) {

@@ -20,19 +20,13 @@ const auto kernel = make_kernel([](auto& rig) { place(rig); },
 
 TEST_CASE("the factor of M with its two passes is the inverse of the mass matrix of body Jacobians") {
   double worst = 0;
-  for (const Model& model : mixed_trees()) {
-    const PlainTree tree = reference::plain_tree(model);
-    for (std::uint64_t seed = 1; seed < 4; ++seed) {
-      const Instance instance = random_instance(tree, seed, 0.1);
-      Rig<double> rig(model);
-      rig.set(instance);
-      factor_mass(rig);
-      pass_up(rig, rig.right_side);
-      pass_down_mass(rig);
-      const VectorXd expected = dense_solve(reference::mass_matrix(tree, instance.q), instance.right_side);
-      see(worst, relative_error(vector(rig.work.increment), expected));
-    }
-  }
+  for_mixed_instances([&](const PlainTree& tree, const Instance& instance, Rig<double>& rig) {
+    factor_mass(rig);
+    pass_up(rig, rig.right_side);
+    pass_down_mass(rig);
+    const VectorXd expected = dense_solve(reference::mass_matrix(tree, instance.q), instance.right_side);
+    see(worst, relative_error(vector(rig.work.increment), expected));
+  });
   INFO("worst relative error: " << worst);
   CHECK(worst < 1e-11);
 }

@@ -32,25 +32,19 @@ const auto force_up = make_kernel(
 
 TEST_CASE("gravity's force is minus the derivative of the potential, and its potential that of all masses") {
   double worst_force = 0, worst_potential = 0, worst_field = 0;
-  for (const Model& model : mixed_trees()) {
-    const PlainTree tree = reference::plain_tree(model);
-    for (std::uint64_t seed = 1; seed < 4; ++seed) {
-      const Instance instance = random_instance(tree, seed, 0.1);
-      Rig<double> rig(model);
-      rig.set(instance);
-      force_up.prepare(rig);
-      force_up.run(rig);
-      const VectorXd Q = reference::potential_force(tree, instance.q, kGravity);
-      const auto pose = reference::poses(tree, instance.q);
-      const double P = reference::potential<double>(tree, pose, kGravity);
-      see(worst_force, relative_error(vector(rig.work.force), Q));
-      see(worst_potential, std::abs(rig.result(0) - P) / std::abs(P));
-      for (Index i = 0; i < tree.slots(); ++i) {
-        const Eigen::Vector3d g = pose[static_cast<std::size_t>(i)].topLeftCorner<3, 3>().transpose() * kGravity;
-        see(worst_field, relative_error(row<Vec3>(rig.work.field, i), g));
-      }
+  for_mixed_instances([&](const PlainTree& tree, const Instance& instance, Rig<double>& rig) {
+    force_up.prepare(rig);
+    force_up.run(rig);
+    const VectorXd Q = reference::potential_force(tree, instance.q, kGravity);
+    const auto pose = reference::poses(tree, instance.q);
+    const double P = reference::potential<double>(tree, pose, kGravity);
+    see(worst_force, relative_error(vector(rig.work.force), Q));
+    see(worst_potential, std::abs(rig.result(0) - P) / std::abs(P));
+    for (Index i = 0; i < tree.slots(); ++i) {
+      const Eigen::Vector3d g = pose[static_cast<std::size_t>(i)].topLeftCorner<3, 3>().transpose() * kGravity;
+      see(worst_field, relative_error(row<Vec3>(rig.work.field, i), g));
     }
-  }
+  });
   INFO("worst relative error of the force " << worst_force << ", of the potential " << worst_potential
                                             << ", of the field " << worst_field);
   CHECK(worst_force < 1e-13);

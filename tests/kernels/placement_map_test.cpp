@@ -14,19 +14,13 @@ const auto kernel = make_kernel(
 
 TEST_CASE("placement_map places every body in its parent as 4 x 4 matrices do") {
   double worst = 0;
-  for (const Model& model : mixed_trees()) {
-    const PlainTree tree = reference::plain_tree(model);
-    for (std::uint64_t seed = 1; seed < 4; ++seed) {
-      const Instance instance = random_instance(tree, seed, 0.1);
-      Rig<double> rig(model);
-      rig.set(instance);
-      kernel.run(rig);
-      for (Index i = 1; i < tree.slots(); ++i) {
-        const auto expected = reference::joint_pose<double>(tree.body(i), instance.q, VectorXd::Zero(tree.velocities));
-        see(worst, (row<Placement>(rig.work.placement, i) - expected).cwiseAbs().maxCoeff());
-      }
+  for_mixed_instances([&](const PlainTree& tree, const Instance& instance, Rig<double>& rig) {
+    kernel.run(rig);
+    for (Index i = 1; i < tree.slots(); ++i) {
+      const auto expected = reference::joint_pose<double>(tree.body(i), instance.q, VectorXd::Zero(tree.velocities));
+      see(worst, (row<Placement>(rig.work.placement, i) - expected).cwiseAbs().maxCoeff());
     }
-  }
+  });
   INFO("worst difference: " << worst / kEpsilon << " epsilon");
   CHECK(worst < 16 * kEpsilon);
 }
