@@ -37,6 +37,12 @@ set(linden_public_headers
   engine/solve/instructions.hpp
   engine/start_check.hpp
   engine/step_report.hpp
+  engine/view/animation.hpp
+  engine/view/animation_recorder.hpp
+  engine/view/curves.hpp
+  engine/view/drawing.hpp
+  engine/view/gltf.hpp
+  engine/view/page.hpp
   layout/attributes.hpp
   layout/body_constants.hpp
   layout/contacts.hpp

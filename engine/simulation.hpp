@@ -129,6 +129,7 @@ class Simulation {
   /// From the next step on it is kept what effects applied, at the cost of a pass up the tree a step where something acts on bodies. What
   /// follows is zero before that, and throws InputError where this was not called.
   void keep_forces();
+  bool keeps_forces() const { return impulses_.has_value(); }
   /// Mean over the step taken last: generalized forces of all effects together [nv; N m, N], conjugate to the velocities. Gravity, armature
   /// and set_forces are not among them, nor blows at limits, which have no duration.
   std::vector<double> joint_forces() const;

@@ -19,6 +19,7 @@ namespace linden {
 struct Welded {
   std::array<double, 10> inertia{};  // m [kg], m c [kg m], xx xy xz yy yz zz about the origin [kg m^2]
   std::vector<BodyShape> shapes;     // of slot 0
+  std::vector<BodyVisual> visuals;   // of slot 0
 
   double mass() const { return inertia[0]; }
 };
@@ -29,11 +30,13 @@ struct Model {
   Attributes attributes;
   std::vector<Mimic> mimics;
   Names names;
-  std::string source;                 // file it was read from, which names of meshes are relative to; empty = made in code
-  std::vector<BodyShape> shapes;      // sorted by slot; none of slot 0
-  std::vector<std::string> warnings;  // what the source said that was read with a grain of salt
-  std::vector<std::string> notes;     // what was done because it was asked for, such as mass from a density
-  Welded welded;                      // links fixed to the world
+  std::string source;                      // file it was read from, which names of meshes are relative to; empty = made in code
+  std::vector<BodyShape> shapes;           // sorted by slot; none of slot 0
+  std::vector<BodyVisual> visuals;         // sorted by slot; none of slot 0
+  std::vector<std::string> warnings;       // what the source said that was read with a grain of salt
+  std::vector<std::string> visual_faults;  // what the source said of visuals and was left out: to be told where the model is looked at
+  std::vector<std::string> notes;          // what was done because it was asked for, such as mass from a density
+  Welded welded;                           // links fixed to the world
 
   /// Free coordinates: velocities less the mimic joints.
   Index degrees_of_freedom() const { return tree.shape.velocities - static_cast<Index>(mimics.size()); }
@@ -41,8 +44,8 @@ struct Model {
   /// Zero configuration [nq]: zeros, identity quaternions, mimic joints at their offsets.
   std::vector<double> neutral() const;
 
-  /// Hash of everything the motion depends on (topology, constants, mimics): a checkpoint belongs to one hash. Shapes move
-  /// nothing by themselves and are not in it.
+  /// Hash of everything the motion depends on (topology, constants, mimics): a checkpoint belongs to one hash. Shapes and
+  /// visuals move nothing by themselves and are not in it.
   std::uint64_t hash() const;
 };
 

@@ -1,6 +1,6 @@
 // layout/shapes.hpp
-// Collision shapes as a robot's file gives them: plain values, nothing worked out yet. What a ground makes of them stands in
-// layout/contacts.hpp.
+// Collision shapes and visuals as a robot's file gives them: plain values, nothing worked out yet. What a ground makes of the first stands
+// in layout/contacts.hpp, what is drawn of both in engine/view/drawing.hpp.
 //
 //   kind       size
 //   sphere     radius
@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "layout/field.hpp"
@@ -39,6 +40,24 @@ struct BodyShape {
   std::string link;  // that had it
   Pose pose;         // in the body's frame
   CollisionShape shape;
+};
+
+/// How a visual looks. Files of textures are not opened.
+struct Material {
+  std::string name;                             // as the source calls it; may be empty
+  std::optional<std::array<double, 4>> rgba{};  // red, green, blue in sRGB, opacity, 0 to 1; none: the source gives no colour
+  std::string texture{};                        // file, as the source calls it; may be empty
+};
+
+/// A shape that is seen and touches nothing.
+struct LinkVisual {
+  LinkShape shape;
+  Material material;
+};
+
+struct BodyVisual {
+  BodyShape shape;
+  Material material;
 };
 
 }  // namespace linden

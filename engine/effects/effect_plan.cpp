@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "engine/effects/plane_frame.hpp"
 #include "engine/effects/stiff_contact.hpp"
 #include "kernels/effects/laws.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
@@ -74,16 +75,6 @@ std::vector<double> felt_inertia(const Model& model, const std::vector<Armature>
   }
   for (const Armature& rotor : rotors) felt[static_cast<std::size_t>(rotor.row)] += rotor.inertia;
   return felt;
-}
-
-std::array<std::array<double, 3>, 3> plane_frame(const std::array<double, 3>& normal) {
-  const Vec3<double> z{normal[0], normal[1], normal[2]};
-  // the plane's x lies in the world's x-z plane where that is possible
-  const Vec3<double> helper = std::abs(z.x) < 0.9 ? Vec3<double>{1, 0, 0} : Vec3<double>{0, 1, 0};
-  const Vec3<double> across = helper - dot(helper, z) * z;
-  const Vec3<double> x = (1 / std::sqrt(dot(across, across))) * across;
-  const Vec3<double> y = cross(z, x);
-  return {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, normal}};
 }
 
 /// Of each candidate those on the first feature that is near, on a terrain also those on further ones.

@@ -2,10 +2,10 @@
 #include <hdf5.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "engine/files/array_file.hpp"
 #include "engine/files/h5_disk.hpp"
+#include "engine/files/h5_handle.hpp"
 #include "engine/files/temporary_folder.hpp"
 
 namespace linden {
@@ -13,42 +13,6 @@ namespace {
 
 // bytes of a chunk: every chunk takes a place in an index and a trip to the disk, and is read whole even where a part is asked for
 constexpr hsize_t kSmallestChunk = 1 << 16, kLargestChunk = 1 << 21;
-
-/// Unless told not to, HDF5 prints its errors; what it is told holds for the thread.
-void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
-
-/// A number that HDF5 gave for something of its own.
-class Handle {
- public:
-  using Close = herr_t (*)(hid_t);
-
-  Handle(hid_t id, Close closing) : id_(id), close_(closing) {}
-  ~Handle() { close(); }
-  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
-  Handle& operator=(Handle&&) = delete;
-
-  hid_t id() const { return id_; }
-  herr_t close() {
-    silence();
-    const hid_t id = std::exchange(id_, H5I_INVALID_HID);
-    return id < 0 ? 0 : close_(id);
-  }
-
- private:
-  hid_t id_;
-  Close close_;
-};
-
-/// What went wrong first in the call that failed.
-std::string first_error() {
-  std::string text = "HDF5 failed";
-  const auto keep_first = [](unsigned depth, const H5E_error2_t* error, void* into) -> herr_t {
-    if (depth == 0 && error->desc) *static_cast<std::string*>(into) = error->desc;
-    return 0;
-  };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
-  return text;
-}
 
 /// [rows, row...] of about one row.
 std::vector<hsize_t> chunk_of(std::span<const hsize_t> row, hsize_t element) {

@@ -66,7 +66,7 @@ void require_writable(const Output& output) {
 
 }  // namespace
 
-Outputs::Outputs(std::initializer_list<Output> outputs) {
+Outputs::Outputs(const std::vector<Output>& outputs) {
   for (const Output& output : outputs) {
     if (output.file.empty()) continue;
     require_writable(output);

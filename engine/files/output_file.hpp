@@ -52,7 +52,8 @@ class Outputs {
  public:
   /// Throws InputError where one cannot be written or two of them are one file. What processes that were killed left of them is told and
   /// removed.
-  Outputs(std::initializer_list<Output> outputs);
+  Outputs(std::initializer_list<Output> outputs) : Outputs(std::vector<Output>(outputs)) {}
+  explicit Outputs(const std::vector<Output>& outputs);
   /// Throws InputError where one of them is a file that is read, whatever path or link leads there.
   void spare(const std::vector<std::string>& read) const;
 

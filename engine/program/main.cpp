@@ -18,6 +18,7 @@
 #include "engine/program/rollout_command.hpp"
 #include "engine/program/run_command.hpp"
 #include "engine/program/scaling_command.hpp"
+#include "engine/program/view_command.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
@@ -65,6 +66,16 @@ struct OptionAdder {
   void randomize(const char* group, OptionTexts& texts) const {
     (*this)(group, "--randomize", texts.randomize, "NAME=RANGE,...", "draw masses, friction, joint_friction or gains; see below");
   }
+  void views(OptionTexts& texts, ViewArguments& views) const {
+    (*this)("Pictures", "--view", views.view, "FILE.html", "the motion as a page that any browser opens");
+    (*this)("Pictures", "--gltf", views.gltf, "FILE.glb", "the motion as binary glTF, for Blender and others");
+    (*this)("Pictures", "--picture", views.picture, "FILE.png", "moments of it side by side (needs Chromium)");
+    (*this)("Pictures", "--film", views.film, "FILE.mp4", "a film of it (needs Chromium and ffmpeg)");
+    (*this)("Pictures", "--fps", texts.views.fps, "F", "frames kept of a second of the motion, default 60");
+    (*this)("Pictures", "--moments", texts.views.moments, "T,T,...", "[s] that the picture shows, default four");
+    (*this)("Pictures", "--size", texts.views.size, "WxH", "pixels of a moment and of the film, default 960x720");
+    (*this)("Pictures", "--look", texts.views.look, "LIST", "azimuth=30,elevation=15,distance=3,follow=pelvis,theme=dark");
+  }
   void start(const char* group, OptionTexts& texts) const {
     (*this)(group, "--start", texts.start, "RULE", "checked (default): a scene may not begin outside limits or in the ground; or as-given");
   }
@@ -97,6 +108,7 @@ CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
   add("Output", "--json", run.json, "FILE.json", "the figures of the summary, for scripts");
   add("Output", "--plot", run.plot, "FILE.svg|png", "drift of energy over time, or what --what says");
   add("Output", "--save", run.save, "FILE", "checkpoint of the last state");
+  add.views(texts, run.views);
   command->footer(
       "Coordinates are named after their joints, a name that is taken with _2 behind it; quaternions are x y z w. Ctrl-C, SIGTERM and\n"
       "SIGHUP end a run early and keep its files; on a full disk it ends with what fits.\n"
@@ -142,6 +154,8 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
   add("Output", "--observe", texts.observe, "LIST", "observations beside it: pose:hand,com,imu:head; see linden run --help");
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
   add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
+  add.views(texts, rollout.views);
+  add("Pictures", "--shown", texts.shown, "N", "instances that are shown, default the first 16");
   command->footer(
       "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C, SIGTERM and SIGHUP end\n"
       "a rollout early and keep its files; on a full disk it ends with what fits.\n\n"
@@ -203,6 +217,32 @@ CLI::App* add_accuracy(CLI::App& program, OptionTexts& texts, AccuracyArguments&
   return command;
 }
 
+CLI::App* add_view(CLI::App& program, OptionTexts& texts, ViewCommandArguments& view) {
+  CLI::App* command = program.add_subcommand("view", "Show a model, the motion of a scene, or a recording.");
+  const OptionAdder add{command};
+  add.model(view.model, "FILE.urdf, SCENE.yaml, chain:N and the like, or a recording: FILE.npz, FILE.h5, FILE.csv");
+  add("Recording", "--model", texts.recorded, "MODEL", "the model or scene that it was recorded of");
+  add("Recording", "--shown", texts.shown, "N", "instances that are shown, default the first 16");
+  add.base("Motion", texts);
+  add.density("Motion", texts);
+  add.strict("Motion", view.strict);
+  add("Motion", "--duration", texts.duration, "S", "simulated time [s], default that of the scene; a model stands still without");
+  add.step(texts);
+  add.gravity("Motion", texts);
+  add("Start", "--seed", texts.seed, "K", "start from random positions and speeds, the same for the same K");
+  add.spread("Start", texts);
+  add.start("Start", texts);
+  add("Output", "--observe", texts.observe, "LIST", "curves beside those of joints and energy: pose:hand,com,contact:foot");
+  add.views(texts, view.views);
+  command->footer(
+      "Without one of --view, --gltf, --picture and --film the page is written as NAME.html in this folder.\n\n"
+      "Examples:\n"
+      "  linden view models/humanoid.urdf\n"
+      "  linden view models/scenes/humanoid_drop.yaml --picture drop.png --look azimuth=40,elevation=10\n"
+      "  linden view motion.npz --model models/humanoid.urdf --base floating --gltf motion.glb");
+  return command;
+}
+
 CLI::App* add_inspect(CLI::App& program, OptionTexts& texts, InspectArguments& inspect) {
   CLI::App* command =
       program.add_subcommand("inspect", "Print a model or scene: effects, bodies, coordinates, masses, sweeps of a step.");
@@ -252,6 +292,7 @@ int run_program(int argc, char** argv) {
   program.footer("Examples:\n"
                  "  linden run chain:100 --duration 5 --plot energy.png\n"
                  "  linden rollout models/humanoid.urdf --base floating --instances 4096 --duration 1\n"
+                 "  linden view models/scenes/humanoid_drop.yaml\n"
                  "  linden accuracy chain:10 --duration 2\n"
                  "  linden scaling --dofs 10..10000\n"
                  "  linden inspect models/humanoid.urdf --base floating\n\n"
@@ -265,11 +306,13 @@ int run_program(int argc, char** argv) {
   ScalingArguments scaling_arguments;
   AccuracyArguments accuracy_arguments;
   InspectArguments inspect_arguments;
+  ViewCommandArguments view_arguments;
   const CLI::App* run = add_run(program, texts, run_arguments);
   const CLI::App* rollout = add_rollout(program, texts, rollout_arguments);
   const CLI::App* accuracy = add_accuracy(program, texts, accuracy_arguments);
   const CLI::App* scaling = add_scaling(program, texts, scaling_arguments);
   const CLI::App* inspection = add_inspect(program, texts, inspect_arguments);
+  const CLI::App* view = add_view(program, texts, view_arguments);
   program.allow_extras();
   for (CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) command->allow_extras();
 
@@ -281,7 +324,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
     std::string help = "linden";
-    for (const CLI::App* command : {run, rollout, accuracy, scaling, inspection}) {
+    for (const CLI::App* command : {run, rollout, view, accuracy, scaling, inspection}) {
       if (!command->parsed()) continue;
       help = "linden " + command->get_name();
       refuse_leftovers(*command, help);
@@ -299,6 +342,11 @@ int run_program(int argc, char** argv) {
     read_rollout_options(texts, rollout_arguments);
     return rollout_command(rollout_arguments);
   }
+  if (view->parsed()) {
+    refuse_leftovers(*view, "linden view");
+    read_view_command_options(texts, view_arguments);
+    return view_command(view_arguments);
+  }
   if (accuracy->parsed()) {
     refuse_leftovers(*accuracy, "linden accuracy");
     read_accuracy_options(texts, accuracy_arguments);
@@ -314,7 +362,7 @@ int run_program(int argc, char** argv) {
     read_inspect_options(texts, inspect_arguments);
     return inspect(inspect_arguments);
   }
-  throw InputError("no command given; choose run, rollout, accuracy, scaling or inspect; linden --help says more");
+  throw InputError("no command given; choose run, rollout, view, accuracy, scaling or inspect; linden --help says more");
 }
 
 constexpr const char* kNoMemory = "there is not enough memory for that; choose a smaller model or fewer instances, or allow more (ulimit -v)";

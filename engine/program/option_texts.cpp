@@ -13,6 +13,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include "engine/files/recorded_arrays.hpp"
 #include "engine/program/randomize.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/scene/scene_file.hpp"
@@ -112,6 +113,7 @@ void read_recording_options(const OptionTexts& texts, Arguments& arguments) {
   if (!texts.every.empty()) arguments.every = integer_from("--every", texts.every, "steps between frames, such as 10");
   if (!texts.what.empty()) arguments.what = quantities_from(texts.what);
   if (!texts.observe.empty()) arguments.observe = observation_names(texts.observe);
+  read_view_options(texts.views, arguments.views);
 }
 
 void read_randomize_option(const OptionTexts& texts, MotionArguments& motion) {
@@ -140,6 +142,10 @@ void read_rollout_options(const OptionTexts& texts, RolloutArguments& rollout) {
   read_randomize_option(texts, rollout);
   if (!texts.instances.empty()) rollout.instances = integer_from("--instances", texts.instances, "how many, such as 4096");
   read_recording_options(texts, rollout);
+  if (!texts.shown.empty()) {
+    if (!rollout.views.any()) throw InputError("--shown says which instances --view, --gltf, --picture and --film show: give one of them too");
+    rollout.shown = integer_from("--shown", texts.shown, "how many instances, such as 16");
+  }
   read_order(texts, rollout.options);
   if (!texts.threads.empty()) {
     const std::int64_t threads = integer_from("--threads", texts.threads, "how many, such as 8; 0 for all there are");
@@ -168,6 +174,28 @@ void read_scaling_options(const OptionTexts& texts, ScalingArguments& scaling) {
 void read_accuracy_options(const OptionTexts& texts, AccuracyArguments& accuracy) {
   read_over_scene(accuracy, accuracy.options, [&] { read_motion_options(texts, accuracy, accuracy.options); });
   if (!texts.budget.empty()) accuracy.budget = number_from("--budget", texts.budget, "seconds, such as 60");
+}
+
+void read_view_command_options(const OptionTexts& texts, ViewCommandArguments& view) {
+  if (!view.views.any()) view.views.view = usual_view(view.model);
+  if (is_recording(view.model)) {
+    view.recording = view.model;
+    if (texts.recorded.empty()) {
+      throw InputError(fmt::format("{} is a recording: --model has to say what it was recorded of, such as --model models/humanoid.urdf "
+                                   "--base floating, or a scene", view.model));
+    }
+    for (const auto& [option, text] : {std::pair{"--duration", texts.duration}, {"--dt", texts.dt}, {"--seed", texts.seed}, {"--spread", texts.spread}}) {
+      if (!text.empty()) throw InputError(fmt::format("{} {}: {} is a recording, which moves as it was recorded; leave it out", option, text, view.model));
+    }
+    view.model = texts.recorded;
+    if (!texts.shown.empty()) view.shown = integer_from("--shown", texts.shown, "how many instances, such as 16");
+    if (view.shown < 1) throw InputError(fmt::format("--shown {}: expected 1 instance or more", view.shown));
+  } else if (!texts.recorded.empty() || !texts.shown.empty()) {
+    throw InputError(fmt::format("{} is about recordings, and {} is none (.npz, .h5, .csv): leave it out",
+                                 texts.recorded.empty() ? "--shown" : "--model", view.model));
+  }
+  view.moves = !texts.duration.empty() || is_scene(view.model);
+  read_run_options(texts, view);
 }
 
 void read_inspect_options(const OptionTexts& texts, InspectArguments& inspect) {

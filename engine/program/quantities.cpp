@@ -18,21 +18,6 @@ namespace {
 
 const std::vector<std::string> kNames{"positions", "velocities", "servos", "forces", "energies", "contacts"};
 
-/// Quantities that there are in the scene.
-std::vector<Quantity> available(const Simulation& simulation) {
-  const Effects& effects = simulation.effects();
-  std::vector<Quantity> there{Quantity::positions, Quantity::velocities};
-  if (!effects.servos.empty()) there.push_back(Quantity::servos);
-  bool acts = false;  // a rotor alone does not
-  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
-    acts = acts || (!std::is_same_v<Entry, Armature> && !entries.empty());
-  });
-  if (acts) there.push_back(Quantity::forces);
-  there.push_back(Quantity::energies);
-  if (effects.ground) there.push_back(Quantity::contacts);
-  return there;
-}
-
 std::vector<std::string> names_of(const std::vector<Quantity>& quantities) {
   std::vector<std::string> names;
   for (const Quantity quantity : quantities) names.push_back(std::string(name(quantity)));
@@ -65,6 +50,20 @@ std::vector<Quantity> quantities_from(const std::string& text) {
 std::vector<Quantity> usual_quantities(const std::string& file) {
   if (std::filesystem::path(file).extension() == ".csv") return {Quantity::positions};
   return {Quantity::positions, Quantity::velocities};
+}
+
+std::vector<Quantity> available_quantities(const Simulation& simulation) {
+  const Effects& effects = simulation.effects();
+  std::vector<Quantity> there{Quantity::positions, Quantity::velocities};
+  if (!effects.servos.empty()) there.push_back(Quantity::servos);
+  bool acts = false;  // a rotor alone does not
+  Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
+    acts = acts || (!std::is_same_v<Entry, Armature> && !entries.empty());
+  });
+  if (acts) there.push_back(Quantity::forces);
+  there.push_back(Quantity::energies);
+  if (effects.ground) there.push_back(Quantity::contacts);
+  return there;
 }
 
 void require_available(const std::vector<Quantity>& asked, const std::vector<Quantity>& there, std::string_view where) {
@@ -107,7 +106,7 @@ std::vector<RecordedArray> recorded_observations(const Observations& observation
 Observer::Observer(Simulation& simulation, std::vector<Quantity> quantities, const std::vector<std::string>& observed)
     : simulation_(simulation), quantities_(std::move(quantities)),
       observations_(observations_of(simulation.model(), simulation.effects(), observed)) {
-  require_available(quantities_, available(simulation), "the scene");
+  require_available(quantities_, available_quantities(simulation), "the scene");
   const Names& names = simulation.model().names;
   for (const Quantity quantity : quantities_) {
     switch (quantity) {

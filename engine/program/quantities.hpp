@@ -33,6 +33,8 @@ std::vector<Quantity> quantities_from(const std::string& text);
 /// What a table has unless told otherwise, and what files of arrays have.
 std::vector<Quantity> usual_quantities(const std::string& file);
 
+/// Those that there are in a simulation's scene.
+std::vector<Quantity> available_quantities(const Simulation& simulation);
 /// Throws InputError for what is asked for and not there. where: that has not got it.
 void require_available(const std::vector<Quantity>& asked, const std::vector<Quantity>& there, std::string_view where);
 

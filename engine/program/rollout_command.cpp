@@ -26,6 +26,8 @@
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
+#include "engine/view/animation_recorder.hpp"
+#include "engine/view/curves.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {
@@ -41,7 +43,10 @@ Outputs checked_outputs(const RolloutArguments& arguments) {
     throw InputError("--observe says what --record takes beside --what: give a --record file too");
   }
   require_available(arguments.what, {Quantity::positions, Quantity::velocities, Quantity::energies}, "a rollout");
-  return {{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
+  if (arguments.shown < 1) throw InputError(fmt::format("--shown {}: expected 1 instance or more", arguments.shown));
+  std::vector<Output> files{{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
+  for (const Output& file : outputs_of(arguments.views)) files.push_back(file);
+  return Outputs(files);
 }
 
 /// Refuses more instances than this machine's memory holds, with what is computed of all of them at once. observed: numbers of each.
@@ -100,15 +105,18 @@ class RolloutExecution {
       file_.emplace(arguments.record, arguments.instances, std::move(arrays), drawn.arrays());
     }
     energy_.resize(static_cast<std::size_t>(arguments.instances));
+    if (arguments.views.any()) begin_views();
   }
 
   void steps(const Interrupt& interrupt) {
     Progress progress(figures_.steps_planned, arguments_.options.step);
     std::int64_t stretch = 1;  // steps between two looks at the clock
     look();
+    look_at_shown();
     while (figures_.steps < figures_.steps_planned && figures_.lost.empty() && interrupt.signal() == 0) {
       std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
       if (file_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
+      if (recorder_) end = std::min(end, (figures_.steps / frame_stride_ + 1) * frame_stride_);
       const Clock::time_point begin = Clock::now();
       batch_.step(end - figures_.steps);
       const Clock::time_point now = Clock::now();
@@ -118,9 +126,11 @@ class RolloutExecution {
       if (taken > 0.4) stretch = std::max<std::int64_t>(1, stretch / 2);
       if (taken < 0.1) stretch = std::min(2 * stretch, figures_.steps_planned);
       if (file_ && figures_.steps % arguments_.every == 0) look();
+      if (recorder_ && figures_.steps % frame_stride_ == 0) look_at_shown();
       progress.update(figures_.steps, now);
     }
     if (looked_at_ != figures_.steps) look();
+    if (recorder_ && figures_.steps % frame_stride_ != 0) look_at_shown();
     if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
     finish();
     if (figures_.signal == 0 && figures_.lost.empty()) account_of_one(interrupt);
@@ -137,6 +147,11 @@ class RolloutExecution {
       });
       if (!before.empty()) figures_.lost = before;
       fine = figures_.lost.empty();
+    }
+    if (recorder_) {
+      WrittenViews views = write_views(arguments_.views, recorder_->animation());
+      figures_.views = std::move(views.lines);
+      fine = fine && views.fine;
     }
     if (!arguments_.json.empty()) {
       fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
@@ -168,7 +183,7 @@ class RolloutExecution {
 
   /// Of the first instance that runs.
   void account_of_one(const Interrupt& interrupt) {
-    constexpr std::int64_t kMostSteps = 10'000, kSamples = 2'000;
+    constexpr std::int64_t kMostAccounted = 10'000, kSamples = 2'000;
     if (effect_lines(effects_, *model_).empty()) return;
     AccountOfOne one;
     while (one.instance < arguments_.instances && batch_.record(one.instance).status != StepStatus::converged) ++one.instance;
@@ -184,7 +199,7 @@ class RolloutExecution {
     const InitialState start = start_of(one.instance);
     alone.set_positions(start.positions);
     alone.set_velocities(start.velocities);
-    const std::int64_t steps = std::min(figures_.steps, kMostSteps), stretch = (steps + kSamples - 1) / kSamples;
+    const std::int64_t steps = std::min(figures_.steps, kMostAccounted), stretch = (steps + kSamples - 1) / kSamples;
     one.energy = EnergyDrift(steps / stretch + 1);
     const auto sample = [&] {
       one.taken = alone.effect_work().taken();
@@ -246,6 +261,33 @@ class RolloutExecution {
     looked_at_ = figures_.steps;
   }
 
+  void begin_views() {
+    const std::int64_t shown = std::min(arguments_.shown, arguments_.instances);
+    const FrameStride stride = frame_stride(figures_.steps_planned, arguments_.options.step, arguments_.views.fps,
+                                            shown * model_->tree.bodies());
+    frame_stride_ = stride.steps;
+    recorder_.emplace(*model_, effects_, model_->names.model, shown);
+    if (!stride.note.empty()) recorder_->add_note(stride.note);
+    if (shown < arguments_.instances) {
+      recorder_->add_note(fmt::format("the first {} of {} instances", grouped(shown), grouped(arguments_.instances)));
+    }
+    constexpr std::int64_t kMostCurves = 2000;
+    for (std::int64_t i = 0; i < shown && shown * model_->tree.shape.positions <= kMostCurves; ++i) {
+      recorder_->add_curves(position_curves(*model_, i));
+    }
+  }
+
+  /// A frame of the instances that are shown.
+  void look_at_shown() {
+    if (!recorder_) return;
+    shown_positions_.clear();
+    for (std::int64_t i = 0; i < std::min(arguments_.shown, arguments_.instances); ++i) {
+      const auto rows = batch_.positions().instance(i);
+      shown_positions_.insert(shown_positions_.end(), rows.begin(), rows.end());
+    }
+    recorder_->add(static_cast<double>(figures_.steps) * arguments_.options.step, shown_positions_, shown_positions_);
+  }
+
   /// What was asked for beside what_, an array of each behind those.
   void observe() {
     batch_.observe(*observations_, std::span<Real>(observed_));
@@ -283,6 +325,9 @@ class RolloutExecution {
   std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
   std::vector<Real> energy_, observed_;
   std::vector<std::uint8_t> status_;
+  std::optional<AnimationRecorder> recorder_;  // of the instances that are shown
+  std::int64_t frame_stride_ = 1;
+  std::vector<double> shown_positions_;
   std::int64_t looked_at_ = -1;
 };
 
@@ -334,6 +379,7 @@ int rollout_command(const RolloutArguments& given) {
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
   const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
+  check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
   look_at_start(arguments, *model, arguments.options);
   return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
 }

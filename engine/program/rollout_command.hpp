@@ -15,6 +15,7 @@
 #include "engine/batch.hpp"
 #include "engine/program/motion_arguments.hpp"
 #include "engine/program/quantities.hpp"
+#include "engine/program/views.hpp"
 
 namespace linden {
 
@@ -27,6 +28,8 @@ struct RolloutArguments : MotionArguments {
   std::string record, json;  // files; empty = none
   std::vector<Quantity> what;  // to record; empty: what is usual
   std::vector<std::string> observe;  // names of observations beside it
+  ViewArguments views;
+  std::int64_t shown = 16;  // instances in them, from the first on
 };
 
 /// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 128 + signal after one. Throws InputError

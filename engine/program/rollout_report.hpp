@@ -32,6 +32,7 @@ struct RolloutFigures {
   std::optional<AccountOfOne> account;                          // where effects act
   int signal = 0;                                               // that ended the rollout
   std::int64_t frames = 0;                                      // recorded
+  std::vector<std::string> views;                               // files that show the motion, and what each holds
   std::string lost;                                             // why the recording ended early, and the rollout with it
 
   double steps_per_second() const { return static_cast<double>(summary.steps) / step_seconds; }

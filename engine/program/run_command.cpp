@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -16,6 +17,7 @@
 #include "engine/files/report_files.hpp"
 #include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
+#include "engine/program/animator.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
 #include "engine/program/randomize.hpp"
@@ -46,13 +48,15 @@ Outputs checked_outputs(const RunArguments& arguments) {
   if (!arguments.what.empty() && arguments.record.empty() && arguments.plot.empty()) {
     throw InputError("--what says what --record and --plot take: give one of them too");
   }
-  if (!arguments.observe.empty() && arguments.record.empty() && arguments.plot.empty()) {
-    throw InputError("--observe says what --record and --plot take beside --what: give one of them too");
+  if (!arguments.observe.empty() && arguments.record.empty() && arguments.plot.empty() && !arguments.views.any()) {
+    throw InputError("--observe says what --record, --plot and --view take beside what is usual: give one of them too");
   }
-  Outputs outputs{{"--record", arguments.record, {".csv", ".npz", ".h5"}},
-                  {"--json", arguments.json, {".json"}},
-                  {"--plot", arguments.plot, {".svg", ".png"}},
-                  {"--save", arguments.save, {}}};
+  std::vector<Output> files{{"--record", arguments.record, {".csv", ".npz", ".h5"}},
+                            {"--json", arguments.json, {".json"}},
+                            {"--plot", arguments.plot, {".svg", ".png"}},
+                            {"--save", arguments.save, {}}};
+  for (const Output& file : outputs_of(arguments.views)) files.push_back(file);
+  const Outputs outputs(files);
   if (!arguments.save.empty() && holds_something_else(arguments.save)) {
     throw InputError(fmt::format("--save {}: the file exists and is no checkpoint; choose another name", arguments.save));
   }
@@ -110,14 +114,16 @@ class RunExecution {
       file_.emplace(arguments.record, 1, observer_->arrays(), arrays.arrays());
     }
     if (!arguments.plot.empty() && !(arguments.what.empty() && arguments.observe.empty())) begin_traces();
+    if (arguments.views.any()) animator_.emplace(simulation, arguments.views, steps, arguments.observe);
   }
 
   void steps(const Interrupt& interrupt) {
     Progress progress(figures_.steps_planned, simulation_.options().step);
     std::int64_t chunk = 1;  // steps between two looks at the clock
     sample();
+    look();
     while (figures_.run.steps < figures_.steps_planned && figures_.failure.empty() && figures_.lost.empty() && interrupt.signal() == 0) {
-      const std::int64_t end = std::min({figures_.steps_planned, figures_.run.steps + chunk, next_sample_});
+      const std::int64_t end = std::min({figures_.steps_planned, figures_.run.steps + chunk, next_sample_, next_frame_});
       const Clock::time_point begin = Clock::now();
       figures_.run.add(simulation_.run(end - figures_.run.steps));
       if (!figures_.run.ok()) figures_.failure = simulation_.describe(figures_.run.last);
@@ -127,10 +133,12 @@ class RunExecution {
       if (taken > 0.04) chunk = std::max<std::int64_t>(1, chunk / 2);
       if (taken < 0.01) chunk = std::min(2 * chunk, figures_.sampled_every);
       if (figures_.run.steps == next_sample_) sample();
+      if (figures_.run.steps == next_frame_) look();
       progress.update(figures_.run.steps, now);
     }
     if (last_sample_ != figures_.run.steps) sample();
     if (last_record_ != figures_.run.steps) record(simulation_.energy());
+    if (animator_ && last_frame_ != figures_.run.steps) look();
     if (figures_.run.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
   }
 
@@ -152,6 +160,11 @@ class RunExecution {
     }
     write(arguments_.save, [&] { simulation_.save(arguments_.save); });
     write(arguments_.plot, [&] { plot::draw(arguments_.plot, run_charts(arguments_, simulation_, figures_)); });
+    if (animator_) {
+      WrittenViews views = write_views(arguments_.views, animator_->animation());
+      figures_.views = std::move(views.lines);
+      fine = fine && views.fine;
+    }
     write(arguments_.json, [&] { write_json(arguments_.json, run_json(arguments_, simulation_, figures_)); });
     return fine;
   }
@@ -227,6 +240,14 @@ class RunExecution {
     next_sample_ = figures_.run.steps + figures_.sampled_every;
   }
 
+  /// A frame of what is to be looked at.
+  void look() {
+    if (!animator_) return;
+    animator_->look();
+    last_frame_ = figures_.run.steps;
+    next_frame_ = figures_.run.steps + animator_->stride();
+  }
+
   void trace(std::vector<plot::Point>& points, plot::Point point) const {
     // the picture is some 640 columns wide: of the samples in one 4,000th of the run only the extremes can be seen
     constexpr std::size_t kMostPoints = 1 << 16;
@@ -243,6 +264,8 @@ class RunExecution {
   std::optional<Observer> observer_;  // of what is recorded or plotted
   std::vector<std::size_t> traced_;   // arrays of it that are plotted
   std::optional<RolloutFile<double>> file_;
+  std::optional<Animator> animator_;
+  std::int64_t last_frame_ = -1, next_frame_ = std::numeric_limits<std::int64_t>::max();
   std::int64_t last_sample_ = -1, last_record_ = -1, next_sample_ = 0;
   std::vector<std::string> written_;
 };
@@ -277,6 +300,7 @@ int run_command(const RunArguments& given) {
 
   std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
+  check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
   const DrawnNumbers drawn = randomize(arguments, model);
   if (arguments.load.empty()) look_at_start(arguments, *model, arguments.options);
   Simulation simulation(model, arguments.options, arguments.effects());

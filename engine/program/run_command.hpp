@@ -15,6 +15,7 @@
 
 #include "engine/program/motion_arguments.hpp"
 #include "engine/program/quantities.hpp"
+#include "engine/program/views.hpp"
 
 namespace linden {
 
@@ -24,6 +25,7 @@ struct RunArguments : MotionArguments {
   std::vector<Quantity> what;                  // to record and to plot; empty: what is usual
   std::vector<std::string> observe;            // names of observations beside it
   std::int64_t every = 1;                      // steps between recorded rows
+  ViewArguments views;
 };
 
 /// Returns the exit code: 0, 1 where a step failed or a file could not be written, 128 + signal after one. Throws InputError for bad input.

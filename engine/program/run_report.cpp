@@ -127,6 +127,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
     if (!file.empty()) row("", printable(fmt::format("{}: {}", file, what)));
   };
   written(arguments.record, fmt::format("{} rows", grouped(figures.rows)));
+  for (const std::string& view : figures.views) row("", printable(view));
   return text;
 }
 

@@ -40,6 +40,7 @@ struct RunFigures {
   std::string failure;             // what Simulation::describe says of the step that failed
   int signal = 0;                  // that ended the run
   std::int64_t rows = 0;           // of the recording
+  std::vector<std::string> views;  // files that show the motion, and what each holds
   std::string lost;                // why the recording ended early, and the run with it
 
   bool complete() const { return failure.empty() && signal == 0 && lost.empty(); }

@@ -24,8 +24,8 @@ inline constexpr StopTest kLastOf<StopTest> = StopTest::absolute;
 
 namespace {
 
-constexpr std::string_view kModelLine = "linden model 1\n", kAnyModel = "linden model ";
-constexpr std::string_view kSceneLine = "linden scene 1\n", kAnyScene = "linden scene ";
+constexpr std::string_view kModelLine = "linden model 2\n", kAnyModel = "linden model ";
+constexpr std::string_view kSceneLine = "linden scene 2\n", kAnyScene = "linden scene ";
 
 template <class T>
 std::string bytes_of(const T& value) {
@@ -45,14 +45,10 @@ class ModelCheck {
     each_field(model_.attributes, [](double value) { return !std::isnan(value); });
     check_names();
     check_mimics();
-    for (const BodyShape& shape : model_.shapes) {
-      require(moves(shape.slot), "a shape of a body that there is not");
-      check_place(shape.pose);
-    }
-    for (const BodyShape& shape : model_.welded.shapes) {
-      require(shape.slot == 0, "a fixed shape on a body that moves");
-      check_place(shape.pose);
-    }
+    for (const BodyShape& shape : model_.shapes) check_shape(shape);
+    for (const BodyVisual& visual : model_.visuals) check_shape(visual.shape);
+    for (const BodyShape& shape : model_.welded.shapes) check_welded_shape(shape);
+    for (const BodyVisual& visual : model_.welded.visuals) check_welded_shape(visual.shape);
   }
 
  private:
@@ -62,6 +58,14 @@ class ModelCheck {
   void check_place(const Pose& pose) const {
     const auto is_finite = [](double number) { return std::isfinite(number); };
     require(std::ranges::all_of(pose.rotation, is_finite) && std::ranges::all_of(pose.shift, is_finite), "a place that is not finite");
+  }
+  void check_shape(const BodyShape& shape) const {
+    require(moves(shape.slot), "a shape of a body that there is not");
+    check_place(shape.pose);
+  }
+  void check_welded_shape(const BodyShape& shape) const {
+    require(shape.slot == 0, "a fixed shape on a body that moves");
+    check_place(shape.pose);
   }
   bool moves(Index slot) const { return slot > 0 && slot < tree_.shape.slots; }
 

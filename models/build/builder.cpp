@@ -272,18 +272,33 @@ class Build {
 
   void collect_shapes() {
     for (std::size_t link = 0; link < links_.size(); ++link) {
-      const Index slot = slot_of(carrier_[link].body);
       for (const LinkShape& shape : links_[link].shapes) {
-        const Isometry3d pose(carrier_[link].pose * isometry(shape.pose));
-        if (!pose.matrix().allFinite()) {
+        std::optional<BodyShape> placed = carried(link, shape);
+        if (!placed) {
           fail(fmt::format("link {}: a collision shape lies too far away for numbers; expected metres; check its origin",
                            quoted(links_[link].name)));
         }
-        (slot == 0 ? model_.welded.shapes : model_.shapes).push_back({slot, links_[link].name, pose_of(pose), shape.shape});
+        (placed->slot == 0 ? model_.welded.shapes : model_.shapes).push_back(std::move(*placed));
+      }
+      for (const LinkVisual& visual : links_[link].visuals) {
+        std::optional<BodyShape> placed = carried(link, visual.shape);
+        if (!placed) {
+          model_.visual_faults.push_back(fmt::format("{}: link {}: a visual lies too far away for numbers; it is left out; check its origin",
+                                                     source_, quoted(links_[link].name)));
+          continue;
+        }
+        (placed->slot == 0 ? model_.welded.visuals : model_.visuals).push_back({std::move(*placed), visual.material});
       }
     }
-    std::stable_sort(model_.shapes.begin(), model_.shapes.end(),
-                     [](const BodyShape& a, const BodyShape& b) { return a.slot < b.slot; });
+    std::ranges::stable_sort(model_.shapes, {}, &BodyShape::slot);
+    std::ranges::stable_sort(model_.visuals, {}, [](const BodyVisual& visual) { return visual.shape.slot; });
+  }
+
+  /// A shape of a link on the body that carries it; nothing where its place is no number.
+  std::optional<BodyShape> carried(std::size_t link, const LinkShape& shape) const {
+    const Isometry3d pose(carrier_[link].pose * isometry(shape.pose));
+    if (!pose.matrix().allFinite()) return std::nullopt;
+    return BodyShape{slot_of(carrier_[link].body), links_[link].name, pose_of(pose), shape.shape};
   }
 
   void name_coordinates(const Body& body) {
@@ -514,9 +529,15 @@ TreeBuilder& TreeBuilder::note(std::string message) {
   return *this;
 }
 
+TreeBuilder& TreeBuilder::visual_fault(std::string message) {
+  visual_faults_.push_back(std::move(message));
+  return *this;
+}
+
 Model TreeBuilder::build() const {
   Model model = Build(name_, source_, links_, warnings_).run();
   model.notes = notes_;
+  model.visual_faults.insert(model.visual_faults.begin(), visual_faults_.begin(), visual_faults_.end());
   return model;
 }
 

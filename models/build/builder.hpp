@@ -7,7 +7,7 @@
 //   any axis                                        body frame turned so that the axis is z
 //   mimic                                           linear map of one coordinate, which has to move a mass, not each of its joints
 //   several roots                                   several trees in one system
-//   collision shapes                                placed in the body's frame; those of links fixed to the world left out
+//   collision shapes, visuals                       placed in the body's frame; those of links fixed to the world kept apart
 //
 // Inertias are checked for physical sense; near misses from rounding in real files warn. No recursion: depth is bounded by
 // memory only (100,000-link chains are built in tests).
@@ -61,6 +61,7 @@ struct LinkSpec {
   double pitch = 0;  // [m/rad], helical only
   LinkInertia inertia;
   std::vector<LinkShape> shapes;
+  std::vector<LinkVisual> visuals;
   JointLimits limits;
   double damping = 0, friction = 0;
   std::string mimic;  // joint that this one follows; empty = none
@@ -76,6 +77,7 @@ class TreeBuilder {
   TreeBuilder& add(LinkSpec link);
   TreeBuilder& warn(std::string message);
   TreeBuilder& note(std::string message);
+  TreeBuilder& visual_fault(std::string message);
 
   /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a shape of negative size, a
   /// coordinate that moves no mass or none that others do not move in the same way, a mimic of a joint that does not exist or is no
@@ -86,7 +88,7 @@ class TreeBuilder {
   std::string name_;
   std::string source_;
   std::vector<LinkSpec> links_;
-  std::vector<std::string> warnings_, notes_;
+  std::vector<std::string> warnings_, notes_, visual_faults_;
 };
 
 }  // namespace linden

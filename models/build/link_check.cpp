@@ -77,16 +77,18 @@ void check_inertia(const LinkSpec& link, const std::string& source, std::vector<
   }
 }
 
-void check_shapes(const LinkSpec& link, const std::string& source) {
-  for (const LinkShape& shape : link.shapes) {
-    const bool mirrors = shape.shape.kind == ShapeKind::mesh;
-    for (const double size : shape.shape.size) {
-      if (!std::isfinite(size) || (size < 0 && !mirrors) || !isometry(shape.pose).matrix().allFinite()) {
-        fail(source, fmt::format("link {}: a collision shape has a negative size, or a size or pose that is not finite",
-                         quoted(link.name)));
-      }
+void check_shape(const LinkShape& shape, const char* what, const LinkSpec& link, const std::string& source) {
+  const bool mirrors = shape.shape.kind == ShapeKind::mesh;
+  for (const double size : shape.shape.size) {
+    if (!std::isfinite(size) || (size < 0 && !mirrors) || !isometry(shape.pose).matrix().allFinite()) {
+      fail(source, fmt::format("link {}: a {} has a negative size, or a size or pose that is not finite", quoted(link.name), what));
     }
   }
+}
+
+void check_shapes(const LinkSpec& link, const std::string& source) {
+  for (const LinkShape& shape : link.shapes) check_shape(shape, "collision shape", link, source);
+  for (const LinkVisual& visual : link.visuals) check_shape(visual.shape, "visual", link, source);
 }
 
 }  // namespace

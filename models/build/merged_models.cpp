@@ -248,6 +248,7 @@ class Merger {
     }
     const auto said = [&](const std::string& text) { return parts_[part].name.empty() ? text : parts_[part].name + ": " + text; };
     for (const std::string& warning : from.warnings) model_.warnings.push_back(said(warning));
+    for (const std::string& fault : from.visual_faults) model_.visual_faults.push_back(said(fault));
     for (const std::string& note : from.notes) model_.notes.push_back(said(note));
   }
 
@@ -257,19 +258,33 @@ class Merger {
     if (one_source) model_.source = source;
     for (std::size_t part = 0; part < parts_.size(); ++part) {
       const Model& from = parts_[part].model;
+      const auto own = [&](BodyShape shape) { return carried(std::move(shape), part, !one_source); };
       for (const std::vector<BodyShape>* shapes : {&from.shapes, &from.welded.shapes}) {
-        for (BodyShape shape : *shapes) {
-          if (shape.slot == 0) shape.pose = pose_of(ground_[part].pose * isometry(shape.pose));
-          shape.slot = carrying_slot(part, shape.slot);
-          shape.link = prefixed(part, shape.link);
-          if (!one_source && shape.shape.kind == ShapeKind::mesh) {
-            if (const std::optional<std::string> file = find_mesh(shape.shape.mesh, from.source)) shape.shape.mesh = *file;
-          }
-          (shape.slot == 0 ? model_.welded.shapes : model_.shapes).push_back(std::move(shape));
+        for (const BodyShape& shape : *shapes) {
+          BodyShape placed = own(shape);
+          (placed.slot == 0 ? model_.welded.shapes : model_.shapes).push_back(std::move(placed));
+        }
+      }
+      for (const std::vector<BodyVisual>* visuals : {&from.visuals, &from.welded.visuals}) {
+        for (const BodyVisual& visual : *visuals) {
+          BodyShape placed = own(visual.shape);
+          (placed.slot == 0 ? model_.welded.visuals : model_.visuals).push_back({std::move(placed), visual.material});
         }
       }
     }
     std::ranges::stable_sort(model_.shapes, {}, &BodyShape::slot);
+    std::ranges::stable_sort(model_.visuals, {}, [](const BodyVisual& visual) { return visual.shape.slot; });
+  }
+
+  /// A shape of a part on the body that carries it now. `whole_path`: its file is no longer found from the source's name.
+  BodyShape carried(BodyShape shape, std::size_t part, bool whole_path) const {
+    if (shape.slot == 0) shape.pose = pose_of(ground_[part].pose * isometry(shape.pose));
+    shape.slot = carrying_slot(part, shape.slot);
+    shape.link = prefixed(part, shape.link);
+    if (whole_path && shape.shape.kind == ShapeKind::mesh) {
+      if (const std::optional<std::string> file = find_mesh(shape.shape.mesh, parts_[part].model.source)) shape.shape.mesh = *file;
+    }
+    return shape;
   }
 
   [[noreturn]] static void fail(const char* what, const std::string& name) {

@@ -18,6 +18,7 @@
 #include "layout/support/input_error.hpp"
 #include "layout/support/text_file.hpp"
 #include "layout/support/words.hpp"
+#include "models/shapes/collada_colours.hpp"
 #include "models/urdf/xml_text.hpp"
 
 namespace linden {
@@ -50,7 +51,7 @@ class Collada {
     if (const XMLElement* scene = shown_scene()) {
       walk(*scene);
     } else {
-      for (const XMLElement* geometry : geometries_) show(*geometry, Affine3d::Identity());
+      for (const XMLElement* geometry : geometries_) show(*geometry, nullptr, Affine3d::Identity());
     }
   }
 
@@ -112,7 +113,7 @@ class Collada {
         } else if (tag == "instance_geometry") {
           const XMLElement* shown = target_of(*child, "url", "geometry");
           if (!shown) fail_reference(*child);
-          show(*shown, pose);
+          show(*shown, child, pose);
         } else {
           pose = pose * step_of(*child, tag);
         }
@@ -170,38 +171,49 @@ class Collada {
     return text ? text : "";
   }
 
-  void show(const XMLElement& geometry, const Affine3d& pose) {
+  /// `instance`: what shows it; may be null.
+  void show(const XMLElement& geometry, const XMLElement* instance, const Affine3d& pose) {
     const auto [at, first_time] = shapes_.try_emplace(&geometry);
     Shape& shape = at->second;
     if (first_time) {
       shape.points = points_of(geometry);
-      if (sink_.wants_triangles()) shape.triangles = triangles_of(geometry, shape.points.size());
+      if (sink_.wants_triangles()) shape.surfaces = surfaces_of(geometry, shape.points.size());
     }
     const auto before = static_cast<std::uint32_t>(points_shown_);
     points_shown_ += shape.points.size();
-    triangles_shown_ += shape.triangles.size();
     if (points_shown_ > kMostPoints) fail(fmt::format("its scene shows over {} points", kMostPoints), "a smaller scene");
+    for (const Surface& surface : shape.surfaces) triangles_shown_ += surface.triangles.size();
     if (triangles_shown_ > kMostPoints) fail(fmt::format("its scene shows over {} triangles", kMostPoints), "a smaller scene");
     for (const Vector3d& point : shape.points) sink_.point(meter_ * (pose * point));
     const bool mirrored = pose.linear().determinant() < 0;
-    for (const auto& [a, b, c] : shape.triangles) sink_.triangle(before + a, before + (mirrored ? c : b), before + (mirrored ? b : c));
+    for (const Surface& surface : shape.surfaces) {
+      if (sink_.wants_colours()) sink_.colour(colours_.of(instance, surface.material));
+      for (const auto& [a, b, c] : surface.triangles) sink_.triangle(before + a, before + (mirrored ? c : b), before + (mirrored ? b : c));
+    }
   }
 
   using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
-  /// A geometry in its own frame.
-  struct Shape {
-    std::vector<Vector3d> points;
+  /// Triangles of one material.
+  struct Surface {
+    std::string_view material;  // as the geometry calls it
     Triangles triangles;
   };
 
-  /// Of the surfaces of a <mesh>, whose `points` they name.
-  Triangles triangles_of(const XMLElement& geometry, std::size_t points) const {
-    Triangles triangles;
+  /// A geometry in its own frame.
+  struct Shape {
+    std::vector<Vector3d> points;
+    std::vector<Surface> surfaces;
+  };
+
+  /// Of a <mesh>, whose `points` they name; those without triangles are left out.
+  std::vector<Surface> surfaces_of(const XMLElement& geometry, std::size_t points) const {
+    std::vector<Surface> surfaces;
     const XMLElement* mesh = geometry.FirstChildElement("mesh");
     for (const XMLElement* at = mesh ? mesh->FirstChildElement() : nullptr; at; at = at->NextSiblingElement()) {
       const std::string_view tag = at->Name();
       if (tag != "triangles" && tag != "polylist" && tag != "polygons" && tag != "tristrips" && tag != "trifans") continue;
+      Triangles triangles;
       std::string_view counts = at->FirstChildElement("vcount") ? content_of(*at->FirstChildElement("vcount")) : "";
       for (const XMLElement* p = at->FirstChildElement("p"); p; p = p->NextSiblingElement("p")) {
         std::vector<std::uint32_t> corners = corners_of(*at, *p, points);
@@ -218,8 +230,10 @@ class Collada {
           cut(corners, corners.size(), triangles);
         }
       }
+      const char* material = at->Attribute("material");
+      if (!triangles.empty()) surfaces.push_back({material ? material : "", std::move(triangles)});
     }
-    return triangles;
+    return surfaces;
   }
 
   /// Numbers of points: one of those that stand together for each corner.
@@ -319,6 +333,10 @@ class Collada {
   const XMLElement* root_ = nullptr;
   std::unordered_map<std::string_view, const XMLElement*> called_;
   std::vector<const XMLElement*> geometries_;
+  ColladaColours colours_{[this](std::string_view id) {
+    const auto found = called_.find(id);
+    return found == called_.end() ? nullptr : found->second;
+  }};
   MeshSink& sink_;
   double meter_ = 1;
   std::unordered_map<const XMLElement*, Shape> shapes_;

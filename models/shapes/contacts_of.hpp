@@ -1,6 +1,6 @@
 // models/shapes/contacts_of.hpp
 // Where the bodies of a model may touch the ground, from the collision shapes of its file (layout/contacts.hpp). Files of meshes are read for
-// this and for masses from a density, and for nothing else: mesh_path.hpp finds them, mesh_box.hpp reads them.
+// this, for masses from a density and where a model is looked at, and for nothing else: mesh_path.hpp finds them, mesh_box.hpp reads them.
 #pragma once
 
 #include <string>

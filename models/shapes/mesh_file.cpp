@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -19,6 +18,8 @@
 #include "layout/support/text_file.hpp"
 #include "layout/support/words.hpp"
 #include "models/shapes/collada.hpp"
+#include "models/shapes/obj_colours.hpp"
+#include "models/shapes/text_lines.hpp"
 
 namespace linden {
 namespace {
@@ -34,28 +35,6 @@ std::string lower_case(std::string_view text) {
 [[noreturn]] void fail(const std::string& file, const std::string& found, const std::string& expected) {
   throw InputError(fmt::format("{}: {}; expected {}", file, found, expected));
 }
-
-/// Lines of a text file. Each is cut at kLongest letters, which no line that holds a point needs.
-class Lines {
- public:
-  explicit Lines(std::ifstream& in) : in_(in) {}
-
-  bool next(std::string_view& line) {
-    in_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
-    line = buffer_.data();
-    if (in_.good()) return true;
-    if (in_.eof()) return !line.empty();
-    if (in_.bad() || in_.gcount() == 0) return false;
-    in_.clear();
-    in_.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-    return true;
-  }
-
- private:
-  static constexpr std::size_t kLongest = 4096;
-  std::ifstream& in_;
-  std::array<char, kLongest> buffer_{};
-};
 
 /// The three numbers that `rest` begins with.
 Vector3d point_in(std::string_view rest, const std::string& file, std::string_view line) {
@@ -86,7 +65,7 @@ class StlTriangles {
 void read_text_stl(std::ifstream& in, const std::string& file, MeshSink& sink) {
   StlTriangles triangles(sink);
   bool ends = false;
-  Lines lines(in);
+  TextLines lines(in);
   for (std::string_view line; lines.next(line);) {
     std::string_view rest = line;
     const std::string word = lower_case(next_word(rest));
@@ -154,7 +133,8 @@ std::uint32_t point_of_face(std::string_view corner, std::int64_t points, const 
 
 void read_obj(std::ifstream& in, const std::string& file, MeshSink& sink) {
   std::int64_t points = 0;
-  Lines lines(in);
+  ObjColours colours(file);
+  TextLines lines(in);
   for (std::string_view line; lines.next(line);) {
     std::string_view rest = line;
     const std::string_view word = next_word(rest);
@@ -162,6 +142,8 @@ void read_obj(std::ifstream& in, const std::string& file, MeshSink& sink) {
       sink.point(point_in(rest, file, line));
       points += 1;
     }
+    if (word == "mtllib" && sink.wants_colours()) colours.read(rest);
+    if (word == "usemtl" && sink.wants_colours()) sink.colour(colours.called(rest));
     if (word != "f" || !sink.wants_triangles()) continue;
     PolygonFan fan(sink);
     for (std::string_view corner = next_word(rest); !corner.empty(); corner = next_word(rest)) {

@@ -13,6 +13,7 @@
 
 #include "layout/support/input_error.hpp"
 #include "models/shapes/mesh_file.hpp"
+#include "models/shapes/welded_points.hpp"
 
 namespace linden {
 namespace {
@@ -20,7 +21,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kOnePoint = 1e-5;      // of the mesh's size
 constexpr double kLeastVolume = 1e-12;  // of the box about it: less is flat
 constexpr std::size_t kMost = 20'000'000;
 
@@ -48,31 +48,10 @@ class Triangles : public MeshSink {
   Vector3d scale_;
 };
 
-struct CellHash {
-  std::size_t operator()(const std::array<std::int64_t, 3>& cell) const {
-    std::uint64_t hash = 0;
-    for (const std::int64_t k : cell) hash = (hash ^ static_cast<std::uint64_t>(k)) * 0x9E3779B97F4A7C15ULL + (hash >> 29);
-    return hash;
-  }
-};
-
-/// For each point the number of the first that lies where it does.
-std::vector<std::uint32_t> welded(const Triangles& mesh) {
-  const double cell = kOnePoint * mesh.box.sizes().maxCoeff();
-  std::unordered_map<std::array<std::int64_t, 3>, std::uint32_t, CellHash> first;
-  std::vector<std::uint32_t> number;
-  number.reserve(mesh.points.size());
-  for (const Vector3d& p : mesh.points) {
-    const Vector3d u = (p - mesh.box.min()) / cell;
-    const std::array<std::int64_t, 3> at{std::llround(u.x()), std::llround(u.y()), std::llround(u.z())};
-    number.push_back(first.try_emplace(at, static_cast<std::uint32_t>(number.size())).first->second);
-  }
-  return number;
-}
-
 bool is_closed(const Triangles& mesh) {
-  if (mesh.triangles.empty() || !(kOnePoint * mesh.box.sizes().maxCoeff() > 0)) return false;
-  const std::vector<std::uint32_t> number = welded(mesh);
+  if (mesh.triangles.empty()) return false;
+  const std::vector<std::uint32_t> number = welded(mesh.points, mesh.box);
+  if (number.empty()) return false;
   std::unordered_map<std::uint64_t, int> runs;  // of an edge: one way less the other
   for (const auto& triangle : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {

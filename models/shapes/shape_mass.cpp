@@ -93,11 +93,15 @@ LinkInertia ShapeMass::sum_of(const std::string& link, const std::vector<LinkSha
   return {sum.mass, center, sum.about_origin - OriginInertia::parallel_axis(sum.mass, center)};
 }
 
-LinkInertia ShapeMass::of(const std::string& link, const std::vector<LinkShape>& collision, const std::vector<LinkShape>& visual) {
+LinkInertia ShapeMass::of(const std::string& link, const std::vector<LinkShape>& collision, const std::vector<LinkVisual>& visual) {
   if (collision.empty() && visual.empty()) return {};  // a frame
   LinkInertia inertia = sum_of(link, collision);
   const bool by_visuals = inertia.mass == 0;
-  if (by_visuals) inertia = sum_of(link, visual);
+  if (by_visuals) {
+    std::vector<LinkShape> shapes;
+    for (const LinkVisual& each : visual) shapes.push_back(each.shape);
+    inertia = sum_of(link, shapes);
+  }
   if (inertia.mass == 0) {
     without_ += 1;
     return inertia;

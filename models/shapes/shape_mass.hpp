@@ -28,7 +28,7 @@ class ShapeMass {
   ShapeMass(double density, std::string source);
 
   /// Of a link without inertia; massless where its shapes have no volume or it has none.
-  LinkInertia of(const std::string& link, const std::vector<LinkShape>& collision, const std::vector<LinkShape>& visual);
+  LinkInertia of(const std::string& link, const std::vector<LinkShape>& collision, const std::vector<LinkVisual>& visual);
 
   /// What was done for all links so far, in one sentence.
   std::string note() const;

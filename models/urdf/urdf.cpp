@@ -84,7 +84,7 @@ class Robot {
 
 Vector3d vector_of(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
 
-Isometry3d pose_of(const urdf::Pose& pose) {
+Isometry3d isometry_of(const urdf::Pose& pose) {
   const urdf::Rotation& r = pose.rotation;
   Isometry3d result = Isometry3d::Identity();
   result.linear() = Eigen::Quaterniond(r.w, r.x, r.y, r.z).toRotationMatrix();
@@ -96,7 +96,7 @@ LinkInertia inertia_of(const urdf::Link& link) {
   LinkInertia result;
   if (!link.inertial) return result;
   const urdf::Inertial& i = *link.inertial;
-  const Isometry3d frame = pose_of(i.origin);
+  const Isometry3d frame = isometry_of(i.origin);
   Matrix3d about_center;
   about_center << i.ixx, i.ixy, i.ixz,  //
       i.ixy, i.iyy, i.iyz,              //
@@ -136,7 +136,7 @@ LinkSpec spec_of(const urdf::Joint& joint, const urdf::Link& link) {
   spec.parent = joint.parent_link_name;
   spec.joint = joint.name;
   spec.type = type_of(joint);
-  spec.placement = pose_of(joint.parent_to_joint_origin_transform);
+  spec.placement = isometry_of(joint.parent_to_joint_origin_transform);
   if (spec.type != JointType::fixed && spec.type != JointType::free)
     spec.axis = vector_of(joint.axis).stableNormalized();
   spec.inertia = inertia_of(link);
@@ -210,9 +210,11 @@ Model parse_urdf(const std::string& xml, const std::string& source_name, Base ba
   TreeBuilder builder(robot->getName());
   builder.source(source_name);
   for (const std::string& warning : checked.warnings) builder.warn(warning);
+  for (const std::string& fault : checked.visual_faults) builder.visual_fault(fault);
   const auto add = [&](LinkSpec spec, const urdf::Link& link) {
     if (const auto found = checked.shapes.find(spec.name); found != checked.shapes.end()) spec.shapes = std::move(found->second);
-    if (mass && !link.inertial) spec.inertia = mass->of(spec.name, spec.shapes, checked.visuals[spec.name]);
+    if (const auto found = checked.visuals.find(spec.name); found != checked.visuals.end()) spec.visuals = std::move(found->second);
+    if (mass && !link.inertial) spec.inertia = mass->of(spec.name, spec.shapes, spec.visuals);
     builder.add(std::move(spec));
   };
   add(root_spec(robot, base), *robot->root_link_);

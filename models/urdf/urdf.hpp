@@ -9,7 +9,8 @@
 //   link without inertial                   massless; where a density is given, with the mass of its shapes (models/shapes/shape_mass.hpp)
 //   limit, dynamics, mimic                  limits, damping and friction, mimic
 //   collision shapes                        shapes; meshes by name only, their files are not opened
-//   visuals                                 read where a density is given and a link has neither inertial nor collision shapes
+//   visuals with their materials            visuals and visual_faults (models/urdf/urdf_visuals.hpp); with a density also the mass of links
+//                                           that have neither inertial nor collision shapes
 //   sensors, all else                       not read; what a reader should know of it is told (models/urdf/urdf_vocabulary.hpp)
 //
 // A tree has one root link. With Base::fixed it is fixed to the world. With Base::floating a free joint called "base"

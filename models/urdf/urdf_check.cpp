@@ -11,6 +11,7 @@
 #include "layout/support/words.hpp"
 #include "models/urdf/urdf_numbers.hpp"
 #include "models/urdf/urdf_shapes.hpp"
+#include "models/urdf/urdf_visuals.hpp"
 #include "models/urdf/urdf_structure.hpp"
 
 namespace linden {
@@ -238,15 +239,18 @@ class Writer {
 
 }  // namespace
 
-CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name, bool visuals) {
+CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name, bool mass_of_shapes) {
   UrdfReport report{source_name, {}, {}};
   const UrdfStructure robot(xml, report);
   CheckedUrdf result;
   result.xml = Writer(robot, report).run();
+  UrdfVisuals visuals(robot, report);
   for (const UrdfLink& link : robot.links()) {
     if (std::vector<LinkShape> shapes = shapes_of(link, report); !shapes.empty()) result.shapes[link.name] = std::move(shapes);
-    if (visuals && !link.element->FirstChildElement("inertial")) result.visuals[link.name] = shapes_of(link, report, "visual");
+    const bool give_mass = mass_of_shapes && !link.element->FirstChildElement("inertial");
+    if (std::vector<LinkVisual> seen = visuals.of(link, give_mass); !seen.empty()) result.visuals[link.name] = std::move(seen);
   }
+  result.visual_faults = visuals.faults();
   for (const UrdfJoint& joint : robot.joints()) result.joints.push_back(joint.name);
   result.warnings = std::move(report.warnings);
   result.suspect = std::move(report.suspect);

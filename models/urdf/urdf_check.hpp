@@ -7,8 +7,9 @@
 //   falls over    deeply nested markup (it recurses), % in a bad number (its message is used as a printf format)
 // The text written here has none of these: links with their <inertial>; joints with origin, parent, child, axis, limit,
 // mimic and dynamics; every number in the shortest form that reads back to the same double. Collision shapes do not pass through
-// urdfdom, which knows no capsules: they are read here (models/urdf/urdf_shapes.hpp). Visuals (but where a mass is to come from them), materials, sensors, transmissions and
-// unknown elements are left out, and what of them a reader should know is told (models/urdf/urdf_vocabulary.hpp).
+// urdfdom, which knows no capsules: they are read here (models/urdf/urdf_shapes.hpp), and so are visuals and materials
+// (models/urdf/urdf_visuals.hpp). Sensors, transmissions and unknown elements are left out, and what of them a reader should know is told
+// (models/urdf/urdf_vocabulary.hpp).
 //
 //   what the file says                              what becomes of it
 //   revolute or prismatic joint without limits      unlimited, with a warning
@@ -39,12 +40,13 @@ struct CheckedUrdf {
   std::string xml;                    // for urdfdom; one root link, no loops, every name found
   std::vector<std::string> joints;    // names in the order of the file, which urdfdom forgets
   std::unordered_map<std::string, std::vector<LinkShape>> shapes;  // of the links that have any
-  std::unordered_map<std::string, std::vector<LinkShape>> visuals;  // of links without <inertial>, where they are asked for
+  std::unordered_map<std::string, std::vector<LinkVisual>> visuals;  // the same
+  std::vector<std::string> visual_faults;  // what is wrong about visuals, in the form of warnings
   std::vector<std::string> warnings;  // `file:line: what was found; how it is read`
   std::string suspect;                // of a slip in a word, which later errors may come from; may be empty
 };
 
-/// `visuals`: also read, where a link has no <inertial>.
-CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name, bool visuals = false);
+/// `mass_of_shapes`: links without <inertial> get their mass from collision shapes or visuals, so that these have to be right.
+CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name, bool mass_of_shapes = false);
 
 }  // namespace linden

@@ -97,15 +97,16 @@ class ShapesReader {
 
 }  // namespace
 
-std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report, const char* tag) {
+std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report) {
   std::vector<LinkShape> shapes;
-  const XMLElement* holder = link.element->FirstChildElement(tag);
-  if (!holder) return shapes;
-  ShapesReader reader(link, report);
-  for (; holder; holder = holder->NextSiblingElement(tag)) {
-    if (std::optional<LinkShape> shape = reader.read(*holder)) shapes.push_back(std::move(*shape));
+  for (const XMLElement* holder = link.element->FirstChildElement("collision"); holder; holder = holder->NextSiblingElement("collision")) {
+    if (std::optional<LinkShape> shape = shape_of(*holder, link, report)) shapes.push_back(std::move(*shape));
   }
   return shapes;
+}
+
+std::optional<LinkShape> shape_of(const XMLElement& holder, const UrdfLink& link, UrdfReport& report) {
+  return ShapesReader(link, report).read(holder);
 }
 
 }  // namespace linden

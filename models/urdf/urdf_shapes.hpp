@@ -1,5 +1,5 @@
 // models/urdf/urdf_shapes.hpp
-// The <collision> elements of a link, or its <visual> ones where a mass is to come from them: an <origin> and the first known shape within <geometry>.
+// The <collision> elements of a link: an <origin> and the first known shape within <geometry>. <visual> has its shape written the same way.
 //
 //   <sphere radius/>  <box size/>  <cylinder radius length/>  <mesh filename scale/>     as the URDF standard has them
 //   <capsule radius length/>                                                             an extension; length without the ends
@@ -8,6 +8,7 @@
 // element is left out with a warning; a number or name that is missing or wrong throws InputError, as in models/urdf/urdf_check.hpp.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "layout/shapes.hpp"
@@ -15,7 +16,9 @@
 
 namespace linden {
 
-/// `tag`: collision or visual.
-std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report, const char* tag = "collision");
+std::vector<LinkShape> shapes_of(const UrdfLink& link, UrdfReport& report);
+
+/// The shape of one <collision> or <visual> of a link; nothing, with a warning, where it holds none.
+std::optional<LinkShape> shape_of(const tinyxml2::XMLElement& holder, const UrdfLink& link, UrdfReport& report);
 
 }  // namespace linden

@@ -45,6 +45,7 @@ TEST_CASE("a model taken to bytes is the same model in all of its members") {
     CHECK(again.tree.branches == model.tree.branches);
     CHECK(again.mimics.size() == model.mimics.size());
     CHECK(again.shapes.size() == model.shapes.size());
+    CHECK(again.visuals.size() == model.visuals.size());
     CHECK(again.source == model.source);
     CHECK(again.warnings == model.warnings);
     CHECK(again.attributes.upper == model.attributes.upper);
@@ -122,7 +123,7 @@ TEST_CASE("bytes that are no scene are refused, with what was found") {
 }
 
 TEST_CASE("bytes whose checksum was made to agree are a scene that can be simulated, or refused") {
-  constexpr std::string_view kLine = "linden scene 1\n";
+  constexpr std::string_view kLine = "linden scene 2\n";
   Model model = load_urdf(model_file("hand.urdf"), Base::fixed);
   const std::string good = to_bytes(busy_scene(model));
   const std::string body = good.substr(kLine.size(), good.size() - kLine.size() - 8);

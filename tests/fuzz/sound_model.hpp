@@ -41,6 +41,9 @@ inline void require_sound(const Model& model) {
   for (const BodyShape& shape : model.shapes) {
     require(shape.slot > 0 && shape.slot < tree.shape.slots && finite(shape.pose), "the place of a shape");
   }
+  for (const BodyVisual& visual : model.visuals) {
+    require(visual.shape.slot > 0 && visual.shape.slot < tree.shape.slots && finite(visual.shape.pose), "the place of a visual");
+  }
 }
 
 }  // namespace linden
