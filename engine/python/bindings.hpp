@@ -109,6 +109,7 @@ void bind_scenes(nb::module_& m);
 void bind_queries(nb::module_& m);
 void bind_simulations(nb::module_& m);
 void bind_observations(nb::module_& m);
+void bind_animations(nb::module_& m);
 void bind_batches(nb::module_& m);
 
 }  // namespace linden::python

@@ -15,6 +15,7 @@ NB_MODULE(LINDEN_MODULE, m) {
   bind_simulations(m);
   bind_observations(m);
   bind_batches(m);
+  bind_animations(m);
   m.def(
       "best_instructions", [] { return std::string(linden::name(linden::best_instructions())); },
       "The widest vector instructions that this processor has and that batches are computed with: \"avx512\", \"avx2\", \"baseline\" or "

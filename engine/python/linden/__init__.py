@@ -38,6 +38,7 @@ from .batch import Batch
 from .errors import InputError, InputWarning, StepError
 from .scenes import Settings, load, load_scene, parse_urdf, scene, step_forces
 from .simulation import Simulation
+from .views import View, view
 
 __version__ = _version("linden")
 
@@ -61,6 +62,7 @@ __all__ = [
     "StepError",
     "StepReport",
     "StepsReport",
+    "View",
     "best_instructions",
     "load",
     "load_scene",
@@ -68,4 +70,5 @@ __all__ = [
     "processor",
     "scene",
     "step_forces",
+    "view",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import operator
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -39,11 +40,12 @@ class InputWarning(UserWarning):
 
 
 def whole_number(argument: str, value: int) -> int:
-    """The number; an InputError that names the argument for anything else."""
+    """The number; an InputError that names the argument for other numbers, a TypeError for what is none."""
     try:
         return operator.index(value)
     except TypeError:
-        raise InputError(f"{argument}: {value!r} is given; expected a whole number") from None
+        kind = InputError if isinstance(value, numbers.Number) else TypeError
+        raise kind(f"{argument}: {value!r} is given; expected a whole number") from None
 
 
 def name_list(argument: str, names: Sequence[str]) -> list[str]:

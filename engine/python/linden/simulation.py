@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Sequence
 from typing import Any, Unpack
@@ -13,6 +14,7 @@ from . import _core
 from ._core import CentreOfMass, Model, Pose, Scene
 from .errors import InputError, name_list
 from .scenes import Settings, made_scene
+from .views import View, motion_of
 
 
 class Simulation(_core.Simulation):
@@ -97,6 +99,14 @@ class Simulation(_core.Simulation):
             seen.observe(self, frame)
         self.run(steps % every)
         return {entry.name: frames[:, entry.slice] for entry in seen.entries}
+
+    def view(self, duration: float = 0.0, fps: float = 60.0) -> View:
+        """The page that shows the simulation: the state as it is, or how it goes on for a duration [s].
+
+        A copy goes on, so that the simulation stays where it is. In a notebook the page appears where this is the last line of a cell; it
+        can be saved as .html or .glb. fps: frames that are kept of a second.
+        """
+        return motion_of(copy.copy(self), duration, fps)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (type(self), self.scene, self.checkpoint())
