@@ -69,12 +69,9 @@ std::string find_browser(const std::string& option) {
                                option));
 }
 
-Browser::Browser(const std::string& page, int width, int height, const std::string& look) {
+Browser::Browser(const std::string& page, const std::string& profile, int width, int height, const std::string& look) {
   const std::string program = find_browser("picture");
-  std::string pattern = (fs::temp_directory_path() / "linden-browser-XXXXXX").string();
-  if (!mkdtemp(pattern.data())) fail(fmt::format("needs a folder in {}: {}", fs::temp_directory_path().string(), std::generic_category().message(errno)));
-  profile_ = pattern;
-  process_.emplace(words_of(program, profile_, width, height),
+  process_.emplace(words_of(program, fs::absolute(profile).string(), width, height),
                    std::vector<std::pair<int, int>>{{commands_.read_end(), 3}, {answers_.write_end(), 4}});
   commands_.close_read();
   answers_.close_write();
@@ -86,12 +83,6 @@ Browser::Browser(const std::string& page, int width, int height, const std::stri
   // what is wrong with the page it says in a sentence
   evaluate("new Promise((yes) => { const wait = () => window.linden ? yes(window.linden.ready) : setTimeout(wait, 10); wait(); })"
            ".then((fault) => { if (fault) throw new Error(fault); })");
-}
-
-Browser::~Browser() {
-  process_.reset();  // before its folder
-  std::error_code ignored;
-  if (!profile_.empty()) fs::remove_all(profile_, ignored);
 }
 
 void Browser::show(double seconds) { evaluate(fmt::format("window.linden.show({:.9g})", seconds)); }

@@ -3,7 +3,7 @@
 // where there is no graphics card, comes from Debian's packages, and what it shows is the page that people open themselves: a second
 // renderer would be a second look.
 //
-//   Browser browser(page, 1280, 720);
+//   Browser browser(page, profile, 1280, 720, "theme=dark");
 //   browser.show(0.5);                     simulated time [s]
 //   const std::string png = browser.picture();
 #pragma once
@@ -18,10 +18,9 @@ namespace linden {
 
 class Browser {
  public:
-  /// The program that find_browser found, which opens the page (an HTML file) in a window of so many pixels. `look`: what is behind the # of
-  /// its address. Throws std::runtime_error where it does not start, where the page complains, and where it does not answer in a minute.
-  Browser(const std::string& page, int width, int height, const std::string& look);
-  ~Browser();
+  /// The program that find_browser found, which opens the page (an HTML file) in a window of so many pixels. `profile`: a folder that it makes
+  /// and keeps its own files in, which must outlive it. `look`: what is behind the # of the address. Throws std::runtime_error where it does not start, where the page complains, and where it does not answer in a minute.
+  Browser(const std::string& page, const std::string& profile, int width, int height, const std::string& look);
   Browser(const Browser&) = delete;
   Browser& operator=(const Browser&) = delete;
 
@@ -34,7 +33,6 @@ class Browser {
   nlohmann::json answer(int id);
   void evaluate(const std::string& expression);
 
-  std::string profile_;  // a folder of its own
   Pipe commands_, answers_;
   std::optional<ChildProcess> process_;
   int calls_ = 0;

@@ -87,7 +87,7 @@ class Stage {
   Stage(const ViewArguments& arguments, const Animation& animation, const std::string& target)
       : folder_(target), page_(folder_.file("page.html")) {
     write_file(page_, page_of(animation));
-    browser_.emplace(page_, arguments.width, arguments.height, "chrome=0" + arguments.look);
+    browser_.emplace(page_, folder_.file("profile"), arguments.width, arguments.height, "chrome=0" + arguments.look);
   }
   std::string picture(double seconds) {
     browser_->show(seconds);
