@@ -102,9 +102,10 @@ struct Bench {
 
   static Vec3<S> gravity() { return {S(0.0), S(0.0), as<S>(-9.81)}; }
 
+  Gains<S> gains() { return {work.gain_up, work.gain_down, work.joint_inverse}; }
   void start() { start_down(model.tree, constants, work); }
-  void factor() { newton_up<true>(model.tree, constants, work); }
-  void factor_exactly() { newton_up<false>(model.tree, constants, work); }
+  void factor() { block_factor_up<true>(model.tree, constants, work, gains()); }
+  void factor_exactly() { block_factor_up<false>(model.tree, constants, work, gains()); }
   void correct() { correct_down(model.tree, constants, h > S(0.0), work); }
   void check() { innovation_up(model.tree, constants, work); }
   void advance() {
@@ -123,6 +124,7 @@ bool agrees(const Model& model) {
   for (double& target : block.work.momentum_target.flat()) target *= 1.001;
   plain.work.momentum_target = block.work.momentum_target;
   block.factor_exactly();
+  block.check();
   block.correct();
   const Tree& tree = model.tree;
   Workspace<double>& work = plain.work;
@@ -168,11 +170,13 @@ void sweep(benchmark::State& state, const Model& model, void (Bench<S>::*action)
   if (!agrees(model)) return state.SkipWithError("the sweeps of a block do not agree with those of one instance");
   Bench<Counted> counting(model);
   counting.factor();
+  counting.check();
   Counted::operations = 0;
   (counting.*counted)();
   const auto operations = static_cast<double>(Counted::operations);
   Bench<S> bench(model);
   bench.factor();
+  bench.check();
   for (auto _ : state) {
     // corrections of nearly nothing, so that the motion stays what it is
     (bench.*action)();
@@ -192,12 +196,12 @@ void add(const std::string& precision, const std::string& name, const std::share
     void (Bench<Counted>::*counted)();
   };
   const Named list[] = {{"start_down", &Bench<S>::start, &Bench<Counted>::start},
-                        {"newton_up", &Bench<S>::factor, &Bench<Counted>::factor},
+                        {"block_factor_up", &Bench<S>::factor, &Bench<Counted>::factor},
                         {"correct_down", &Bench<S>::correct, &Bench<Counted>::correct},
                         {"innovation_up", &Bench<S>::check, &Bench<Counted>::check},
                         {"advance_down", &Bench<S>::advance, &Bench<Counted>::advance},
                         {"momentum_up", &Bench<S>::momentum, &Bench<Counted>::momentum},
-                        {"newton_up_exact", &Bench<S>::factor_exactly, &Bench<Counted>::factor_exactly}};
+                        {"block_factor_up_exact", &Bench<S>::factor_exactly, &Bench<Counted>::factor_exactly}};
   for (const Named& one : list) {
     benchmark::RegisterBenchmark(fmt::format("{}/{}/{}", name, precision, one.name).c_str(),
                                  [=](benchmark::State& state) { sweep<S>(state, *model, one.action, one.counted); });

@@ -26,8 +26,6 @@ void check_batch(std::int64_t size, const Options& options, const BatchOptions& 
   const auto refuse = [](const char* what, std::string_view found, std::string_view only) {
     throw InputError(fmt::format("a batch has no {} \"{}\"; it knows \"{}\" (a Simulation has them all)", what, found, only));
   };
-  if (options.order != 2) refuse("order", fmt::format("{}", options.order), "2");
-  if (options.reduction != 0) refuse("reduction", fmt::format("{:g}", options.reduction), "0");
   if (options.solver != Solver::newton) refuse("solver", name(options.solver), name(Solver::newton));
   if (options.guess != FirstGuess::extrapolation) refuse("first guess", name(options.guess), name(FirstGuess::extrapolation));
   if (options.stop != StopTest::energy) refuse("stop test", name(options.stop), name(StopTest::energy));
@@ -223,6 +221,7 @@ void BatchOf<Real>::set_inertia(std::int64_t i, Index slot, const std::array<dou
                                  i, model().names.body[static_cast<std::size_t>(slot)], m));
   }
   data_->asked(data_->mass);
+  data_->forget_factor(i);
   for (std::size_t k = 0; k < 10; ++k) data_->mass_row(i, slot)[k * static_cast<std::size_t>(lanes())] = static_cast<Real>(inertia[k]);
   // each sum anew, so that it does not depend on the masses there were before
   for (Index body = slot;; body = tree.parent(body)) {
@@ -284,6 +283,7 @@ BatchSummary BatchOf<Real>::summary() const {
     sum.frozen += record.status != StepStatus::converged ? 1 : 0;
     sum.steps += record.steps;
     sum.evaluations += record.evaluations;
+    sum.factors += record.factors;
     sum.rescued += record.rescued;
   }
   return sum;

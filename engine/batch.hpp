@@ -9,16 +9,16 @@
 //   batch.record(7).status            an instance whose step failed is frozen at its last good state
 //
 // Memory is [block][row][lane]: a block of W instances, W the lanes of the processor's registers, lies together, so that a thread takes it
-// through many steps without leaving its cache. Positions, momenta and one number more a degree of freedom and instance are all
-// that is kept; with effects two more, and one a contact point.
+// through many steps without leaving its cache. Of an instance are kept positions, momenta, one number more a degree of freedom for each
+// sub-step (one at order 2, engine/compose/composition.hpp), with effects two more, and one a contact point. At order 2, where no effect
+// sticks, stops or saturates, the factor of a step is kept too, 52 bytes a screw: most steps do without making one
+// (engine/sweeps/lane_factor.hpp).
 //
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
 //
 // Effects act as in a Simulation, on lanes and threads alike; gravity, masses, forces, servo targets and gains, friction of joints and of the
 // ground may differ from instance to instance.
-//
-// Models with mimic joints are stepped an instance at a time, on all threads but without lanes.
 #pragma once
 
 #include <Eigen/Core>
@@ -47,6 +47,9 @@ struct Scene;
 struct BatchOptions {
   int threads = 0;                             // 0: all that the machine has
   std::optional<Instructions> instructions{};  // none: the best that the processor has
+  /// Whether the factor of a step is kept for those that follow, where effects allow it: half of the time of a free step, and 52 bytes a screw
+  /// of an instance. With and without, results differ by what the tolerance of a step leaves.
+  bool hold_factors = true;
 };
 
 /// Throws InputError where `found` is none of first..last, which are called `what`.
@@ -92,6 +95,7 @@ struct BatchSummary {
   std::int64_t frozen = 0;
   std::int64_t steps = 0;
   std::int64_t evaluations = 0;  // of the residual
+  std::int64_t factors = 0;      // of the Jacobian, but for those of steps taken alone
   std::int64_t rescued = 0;      // steps taken alone
 };
 
@@ -99,7 +103,8 @@ template <class Real>
 class BatchOf {
  public:
   /// Every instance at rest in the model's zero configuration. Throws InputError for options that make no sense or that a batch does not
-  /// have: it solves by Newton's method, starts from extrapolation and stops by energy. Here and below an instance or a body that there is
+  /// have: it solves by Newton's method, starts from extrapolation and stops by energy; above order 2, for effects that cannot be taken back in
+  /// time. Here and below an instance or a body that there is
   /// not, and a null pointer, are InputErrors too.
   BatchOf(Model model, std::int64_t size, const Options& options = {}, const Effects& effects = {}, const BatchOptions& computed = {});
   BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const Options& options = {}, const Effects& effects = {},
@@ -193,7 +198,7 @@ class BatchOf {
 
   /// What was asked for (engine/queries/observations.hpp) of every instance, on all threads: [size x width], instance by instance. Frozen
   /// instances are seen in their last good state. Throws InputError for another length, for observations of another model, and for
-  /// accelerations where a batch does not know them: in single precision, and of models with mimic joints.
+  /// accelerations where a batch does not know them: in single precision and above order 2.
   void observe(const Observations& observations, std::span<double> to) const;
   void observe(const Observations& observations, std::span<float> to) const;
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <thread>
 
+#include "engine/compose/composition.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/threads.hpp"
 #include "layout/support/input_error.hpp"
@@ -50,8 +51,10 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
     : model(std::move(shared)), model_hash(model->hash()), constants(rounded<Real>(model->constants, shape())), options(given), size(count),
       instructions(computed.instructions.value_or(best_instructions())), lanes(lanes_of<Real>(instructions)),
       threads(computed.threads > 0 ? computed.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
+      hold_factors(computed.hold_factors),
       plan(*model, options, effects),
       arena(threads) {
+  check_order(options.order, effects);
   require_threads(threads);
   first_child.assign(static_cast<std::size_t>(shape().slots) + 1, 0);
   for (Index slot = 1; slot < shape().slots; ++slot) ++first_child[static_cast<std::size_t>(model->tree.parent(slot)) + 1];
@@ -64,18 +67,23 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
   blocks = (size + lanes - 1) / lanes;
   const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
   const double numbers = shape().positions + (plan.any() ? 4.0 : 1.0) * shape().velocities + plan.kept();
-  const double words = static_cast<double>(kHistoryWords<Real>) * shape().velocities;
+  const double words = static_cast<double>(past_rows()) + (holds_factor() ? packed_factor_words(*model) : 0);
   const double each = numbers * sizeof(Real) + words * sizeof(std::uint32_t) + sizeof(InstanceRecord);
   require_memory(fmt::format("{} instances", size), each * static_cast<double>(size));
   q.resize(rows(shape().positions));
   p.resize(rows(shape().velocities));
-  past.resize(rows(shape().velocities * kHistoryWords<Real>));
+  past.resize(rows(past_rows()));
   if (plan.any()) {
     excess_before.resize(rows(shape().velocities));
     reading.resize(rows(shape().velocities));
     bend.assign(rows(shape().velocities), Real(kAnyBend));
   }
   kept.resize(rows(plan.kept()));
+  if (holds_factor()) {
+    factor.resize(rows(packed_factor_words(*model)));
+    held.resize(rows(kHeldNumbers));
+    for (std::int64_t i = 0; i < size; ++i) forget_factor(i);
+  }
   records.resize(static_cast<std::size_t>(size));
   const std::vector<double> neutral = model->neutral();
   for_blocks([&](std::int64_t b, Worker&) {
@@ -87,12 +95,19 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
 }
 
 template <class Real>
+Index BatchOf<Real>::Data::past_rows() const {
+  return static_cast<Index>(composition(options.order).size()) * shape().velocities * kHistoryWords<Real>;
+}
+
+template <class Real>
 Block<Real> BatchOf<Real>::Data::block(std::int64_t b) {
   const Index nv = shape().velocities;
   const auto rows_of = [&](auto& numbers, Index count) { return numbers.empty() ? nullptr : numbers.data() + at(b, count); };
   return {.q = rows_of(q, shape().positions),
           .p = rows_of(p, nv),
-          .past = rows_of(past, nv * kHistoryWords<Real>),
+          .past = rows_of(past, past_rows()),
+          .factor = rows_of(factor, packed_factor_words(*model)),
+          .held = rows_of(held, kHeldNumbers),
           .applied = rows_of(applied, nv),
           .mass = rows_of(mass, shape().slots * kMassRows),
           .gravity = rows_of(gravity, 3),
@@ -112,10 +127,18 @@ template <class Real>
 typename BatchOf<Real>::Data::Worker& BatchOf<Real>::Data::worker() const {
   Worker& mine = workers.local();
   if (!mine.block) {
-    mine.block = make<Real>(instructions, {*model, constants, options, plan});
+    mine.block = make<Real>(instructions, {*model, constants, options, plan, holds_factor()});
     mine.instance = std::make_unique<InstanceStepper>(*model, options, plan);
   }
   return mine;
+}
+
+template <class Real>
+void BatchOf<Real>::Data::forget_factor(std::int64_t i) {
+  if (held.empty()) return;
+  const HeldFactor<Real> none;
+  const BatchView<Real> numbers(held, kHeldNumbers, lanes, size);
+  for (Index k = 0; k < kHeldNumbers; ++k) numbers(i, k) = none.numbers()[static_cast<std::size_t>(k)];
 }
 
 template <class Real>
@@ -167,11 +190,12 @@ void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> position
     const BatchView<Number> rows(numbers, count_of_rows, lanes, size);
     for (Index row = 0; !numbers.empty() && row < count_of_rows; ++row) rows(i, row) = static_cast<Number>(to);
   };
-  clear(past, shape().velocities * kHistoryWords<Real>);
+  clear(past, past_rows());
   clear(excess_before, shape().velocities);
   clear(reading, shape().velocities);
   clear(bend, shape().velocities, kAnyBend);
   clear(kept, plan.kept());
+  forget_factor(i);
   records[static_cast<std::size_t>(i)] = {};
 }
 

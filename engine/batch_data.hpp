@@ -15,7 +15,9 @@
 #include "engine/effects/own_numbers.hpp"
 #include "engine/queries/batch_observer.hpp"
 #include "engine/solve/block_stepper.hpp"
+#include "engine/solve/held_factor.hpp"
 #include "engine/solve/instance_stepper.hpp"
+#include "layout/packed_factor.hpp"
 #include "layout/packed_history.hpp"
 
 namespace linden {
@@ -39,9 +41,10 @@ struct BatchOf<Real>::Data {
   Instructions instructions;
   int lanes;
   int threads;
+  bool hold_factors;
   EffectPlan plan;
-  Numbers<Real> q, p, applied, mass, gravity, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
-  Numbers<std::uint32_t> past;
+  Numbers<Real> q, p, held, applied, mass, gravity, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
+  Numbers<std::uint32_t> past, factor;
   std::vector<Index> first_child, child_list;  // see children
   std::vector<InstanceRecord> records;
   mutable oneapi::tbb::task_arena arena;
@@ -53,6 +56,13 @@ struct BatchOf<Real>::Data {
   const Shape& shape() const { return model->tree.shape; }
   std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
 
+  /// Whether the factor of a step serves those that follow.
+  bool holds_factor() const { return hold_factors && options.order == 2 && !plan.has_states; }
+  /// Words of an instance's displacements: of every sub-step its own.
+  Index past_rows() const;
+  static constexpr Index kHeldNumbers = HeldFactor<Real>::kNumbers;
+  /// The next step of instance i makes one of its own.
+  void forget_factor(std::int64_t i);
   Block<Real> block(std::int64_t b);
   Worker& worker() const;  // of the thread that asks
 
@@ -75,11 +85,13 @@ struct BatchOf<Real>::Data {
     const Index nv = self.shape().velocities;
     visit(self.q, self.shape().positions);
     visit(self.p, nv);
-    visit(self.past, nv * kHistoryWords<Real>);
+    visit(self.past, self.past_rows());
     visit(self.excess_before, nv);
     visit(self.reading, nv);
     visit(self.bend, nv);
     visit(self.kept, self.plan.kept());
+    visit(self.factor, packed_factor_words(*self.model));
+    visit(self.held, kHeldNumbers);
     each_asked(self, [&](auto& numbers, Index rows, const auto&) { visit(numbers, rows); });
   }
   /// visit(numbers, rows, own) of what has no memory until it is asked for; own(row): what it holds at first.

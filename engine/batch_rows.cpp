@@ -105,7 +105,7 @@ void BatchOf<Real>::Data::check_observations(const Observations& observations, s
   }
   if (!schedule.accelerations) return;
   const char* const why = std::is_same_v<Real, float> ? "in single precision it keeps too little of its last steps"
-                          : !model->mimics.empty()    ? "with mimic joints it keeps one step alone"
+                          : options.order != 2        ? "above order 2 its sub-steps differ in length"
                                                       : nullptr;
   if (why != nullptr) throw InputError(fmt::format("accelerations were asked of a batch: {}; leave them out, or ask a Simulation", why));
 }
@@ -114,7 +114,7 @@ template <class Real>
 template <class Number>
 void BatchOf<Real>::Data::observe(const Observations& observations, std::span<Number> to, std::int64_t b, Worker& mine, bool stepped) {
   if (!mine.observer || mine.observer->schedule() != observations.schedule().get()) {
-    const BlockSetup<Real> setup{*model, constants, options, plan};
+    const BlockSetup<Real> setup{*model, constants, options, plan, holds_factor()};
     mine.observer = std::make_unique<BatchObserver<Real>>(observations.schedule(), setup, instructions);
   }
   const Block<Real> here = block(b);

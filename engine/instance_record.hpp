@@ -15,6 +15,7 @@ struct InstanceRecord {
   std::int8_t displacements = 0;              // how many earlier displacements the first guess may use
   Index slot = 0;                             // where a frozen instance failed: body or joint; 0 = fine
   std::int32_t rescued = 0;                   // steps taken alone: backtracked or split, as a Simulation would
+  std::uint32_t factors = 0;                  // of the Jacobian, but for those of steps taken alone
   std::int64_t steps = 0;                     // since the start or the last reset
   std::int64_t evaluations = 0;               // of the residual, likewise
   double residual = 0;                        // relative, of a frozen instance's failed step

@@ -80,9 +80,9 @@ class LaneEffects {
     return L::bits(stopped_bounces(sweeps_.limits(), sweeps_.plan().q_row, q, delta, before_, L::mask(known_)));
   }
 
-  /// What effects do to an evaluation, and to its h^2 x kinetic energy; its exact factor, and its norm.
+  /// What effects do to an evaluation, and to its h^2 x kinetic energy.
   template <class Element>
-  Pack act(const BodyConstants<Element>& constants, Workspace<Pack>& work, Pack& energy) {
+  void act(const BodyConstants<Element>& constants, Workspace<Pack>& work, Pack& energy) {
     const EffectPlan& plan = sweeps_.plan();
     if (plan.bodies) sweeps_.bodies(constants, work.displacement, work.impulse);
     if (plan.joints) {
@@ -90,10 +90,17 @@ class LaneEffects {
       sweeps_.joints(work.delta, work.motion, work.momentum_target);
       energy = energy + armature_energy<Pack>(plan.effects.armature, work.delta);
     }
+  }
+  /// action(added): what they add to a factor.
+  template <class Action>
+  void with_added(const Action& action) const {
     const auto& stiffness = sweeps_.joint_sum().stiffness;
     const auto& body_stiffness = sweeps_.body_sum().body_stiffness;
-    if (plan.bodies) return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, true>{stiffness, body_stiffness});
-    return newton_up<false>(tree_, constants, work, EffectsAdded<Pack, true, false>{stiffness, body_stiffness});
+    if (sweeps_.plan().bodies) {
+      action(EffectsAdded<Pack, true, true>{stiffness, body_stiffness});
+    } else {
+      action(EffectsAdded<Pack, true, false>{stiffness, body_stiffness});
+    }
   }
 
   /// Velocities no farther from the mean ones of the last step than the motion bends.

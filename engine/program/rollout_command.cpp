@@ -372,10 +372,6 @@ int rollout_command(const RolloutArguments& given) {
   check(arguments.options);
   const std::int64_t steps = step_count(arguments, arguments.options.step);
   const Outputs outputs = checked_outputs(arguments);
-  if (arguments.options.order != 2) {
-    throw InputError(fmt::format("--order {}: a rollout has order 2 alone; expected 2; give --order 2, or simulate one instance with linden run",
-                                 arguments.options.order));
-  }
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
   const std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);

@@ -46,6 +46,10 @@ double evaluations_mean(const RolloutFigures& figures) {
   return static_cast<double>(figures.summary.evaluations) / static_cast<double>(figures.summary.steps);
 }
 
+double factors_mean(const RolloutFigures& figures) {
+  return static_cast<double>(figures.summary.factors) / static_cast<double>(figures.summary.steps);
+}
+
 }  // namespace
 
 std::string rollout_summary(const RolloutArguments& arguments, const Model& model, const RolloutFigures& figures) {
@@ -69,12 +73,12 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
   if (const std::string ignored = IgnoredByScene(model, effects).text(); !ignored.empty()) {
     row("ignored", ignored + "; a scene can name them");
   }
-  row("method", fmt::format("newton, step {:g} s, tolerance {:g} (energy), {}", options.step,
+  row("method", fmt::format("newton, {}step {:g} s, tolerance {:g} (energy), {}",
+                            options.order == 2 ? "" : fmt::format("order {}, ", options.order), options.step,
                             arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance,
                             gravity_text(options)));
   row("processor", fmt::format("{} of {} instances ({})", counted(figures.threads, "thread"), figures.lanes,
-                               model.mimics.empty() ? std::string(name(arguments.computed.instructions.value_or(best_instructions())))
-                                                    : "mimic joints: stepped one by one"));
+                               name(arguments.computed.instructions.value_or(best_instructions()))));
   if (figures.summary.steps > 0) {
     const double simulated = static_cast<double>(figures.steps) * options.step;
     row("rollout", figures.signal == 0 ? fmt::format("{:.6g} s, {} of every instance", simulated, counted(figures.steps, "step"))
@@ -82,8 +86,9 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
     row("speed", fmt::format("{} env-steps/s, {:.1f} ns per body and step on a thread, {:.4g} times real time",
                              grouped(std::llround(figures.steps_per_second())), ns_per_body_step(model, figures),
                              figures.steps_per_second() * options.step));
-    row("iterations", fmt::format("{:.3f} evaluations of the residual per step{}", evaluations_mean(figures),
-                                  figures.summary.rescued > 0 && model.mimics.empty()
+    row("iterations", fmt::format("{:.3f} evaluations of the residual and {:.3f} factors per step{}", evaluations_mean(figures),
+                                  factors_mean(figures),
+                                  figures.summary.rescued > 0
                                       ? fmt::format("; {} taken alone", counted(figures.summary.rescued, "step"))
                                       : ""));
     // where effects give and take its change says nothing
@@ -99,7 +104,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
   }
   if (!effect_lines(effects, model).empty() && figures.summary.steps > 0) {
     row("verdict", fmt::format("{} of {} frozen, {} of {} taken alone{}", grouped(figures.summary.frozen), counted(arguments.instances, "instance"),
-                               model.mimics.empty() ? grouped(figures.summary.rescued) : "all", counted(figures.summary.steps, "step"),
+                               grouped(figures.summary.rescued), counted(figures.summary.steps, "step"),
                                !figures.account                    ? ""
                                : figures.account->warnings.empty() ? ", the energy of that instance is accounted for"
                                                                    : ", the energy of that instance is not accounted for"));
@@ -150,6 +155,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"ns_per_body_step", if_ran(ns_per_body_step(model, figures))},
       {"iterations_mean", if_ran(evaluations_mean(figures) - 1)},
       {"evaluations_mean", if_ran(evaluations_mean(figures))},
+      {"factors_mean", if_ran(factors_mean(figures))},
       {"steps_alone", figures.summary.rescued},
       {"energy_change_mean", energy.mean},
       {"energy_change_median", energy.median},

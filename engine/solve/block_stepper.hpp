@@ -21,6 +21,8 @@ struct Block {
   Real* q;                    // [nq]
   Real* p;                    // [nv]
   std::uint32_t* past;        // layout/packed_history.hpp
+  std::uint32_t* factor;      // [packed_factor_words] of the step that made it last; null: no factor outlasts a step
+  Real* held;                 // [4] what is known of it (engine/solve/held_factor.hpp); null likewise
   const Real* applied;        // [nv] forces given from outside; null: none
   const Real* mass;           // [slots x 11] inertia and subtree_mass of each instance; null: the model's
   const Real* gravity;        // [3] of each instance [m/s^2], world frame; null: that of the options
@@ -57,6 +59,7 @@ struct BlockSetup {
   const BodyConstants<Real>& constants;
   const Options& options;
   const EffectPlan& plan;  // beside gravity
+  bool holds_factor;       // from step to step; what acts must have no states
 };
 
 /// kEffects: with those of the plan.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/compose/composition.hpp"
 #include "engine/effects/effect_plan.hpp"
 #include "kernels/tree/mimic.hpp"
 #include "layout/support/input_error.hpp"
@@ -49,8 +50,13 @@ void InstanceStepper::refresh() {
 
 StepReport InstanceStepper::step(double time) {
   refresh();
-  int history = 0;
-  return stepper_->step(state_, history, time, options_.step, Then::stop);
+  StepReport whole;
+  for (const double stage : composition(options_.order)) {
+    int history = 0;
+    whole.add(stepper_->step(state_, history, time, stage * options_.step, Then::stop));
+    if (!whole.ok()) break;
+  }
+  return whole;
 }
 
 void InstanceStepper::set_velocities(std::span<const double> v) {

@@ -5,6 +5,9 @@
 //   solve               each lane by its own numbers and by how often it was corrected, never by its neighbours
 //   end                 new positions and momenta, in the lanes that are done
 //
+// A step of an order above 2 is a row of such steps (engine/compose/composition.hpp), each with first guesses from its own displacements in the
+// steps before. Where one fails, the lane goes back to where the step began.
+//
 // Every instruction that a lane's result depends on is the same in any company, so results are equal to the bit in any block, any place and
 // with any number of threads.
 //
@@ -16,6 +19,7 @@
 #include <bit>
 #include <cmath>
 
+#include "engine/compose/composition.hpp"
 #include "engine/solve/block_stepper.hpp"
 #include "engine/solve/instance_stepper.hpp"
 #include "engine/solve/solve.hpp"
@@ -42,7 +46,11 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   explicit LaneStepper(const BlockSetup<Real>& setup)
       : model_(setup.model), tree_(setup.model.tree), options_(setup.options), sweeps_(setup), work_(sweeps_.work()),
-        alone_(model_, options_, setup.plan) {}
+        alone_(model_, options_, setup.plan), stages_(composition(options_.order)) {
+    if (stages_.size() == 1) return;
+    start_q_.allocate(tree_.shape.positions);
+    start_p_.allocate(tree_.shape.velocities);
+  }
 
   int lanes() const override { return W; }
 
@@ -57,9 +65,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   void observe(const Block<Real>& block, Real* velocities, Real* energy, bool stepped) override {
     if (!stepped) sweeps_.load(block);
-    bool alone = !model_.mimics.empty();
-    if constexpr (kEffects) alone = alone || !sweeps_.effects().plan().curves.empty();
-    if (alone) return observe_alone(block, velocities, energy);
+    if constexpr (kEffects) {
+      if (!sweeps_.effects().plan().curves.empty()) return observe_alone(block, velocities, energy);
+    }
     if (!stepped && energy != nullptr) sweeps_.refresh();
     if (!stepped && energy == nullptr) sweeps_.place();
     if (energy != nullptr) L::store(sweeps_.potential(), energy + W);
@@ -84,9 +92,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   /// Row of the displacement that the last ones lead to.
-  static Pack extrapolated(const Block<Real>& block, Index row) {
+  static Pack extrapolated(const std::uint32_t* past, Index row) {
     alignas(kAlignment) Real next[W];
-    extrapolate<W>(block.past + row * kWords, next);
+    extrapolate<W>(past + row * kWords, next);
     return L::load(next);
   }
   /// Lanes of which an earlier displacement is known.
@@ -96,8 +104,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     return lanes;
   }
 
-  void first_guess(const Block<Real>& block, Lanes alive, Lanes extrapolates) {
-    for (Index row = 0; row < tree_.shape.velocities; ++row) work_.delta(row) = extrapolated(block, row);
+  void first_guess(const std::uint32_t* past, Lanes alive, Lanes extrapolates) {
+    for (Index row = 0; row < tree_.shape.velocities; ++row) work_.delta(row) = extrapolated(past, row);
     if ((alive & ~extrapolates) == 0) return;
     // no displacement is known yet: h M^-1 (p + h/2 Q)
     sweeps_.solve_mass(work_.momentum_target, work_.increment);
@@ -107,45 +115,71 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
 
   /// Returns the lanes still alive.
   Lanes step_once(const Block<Real>& block, Lanes alive) {
-    sweeps_.find_target();
-    if (!model_.mimics.empty()) return finish(block, alive, 0, alive);  // joints that are tied are stepped alone
-    const Lanes extrapolates = known(block);
-    first_guess(block, alive, extrapolates);
-    Solve solve(sweeps_, kEffects ? kBlockWithEffects : kSmoothBlock);
-    const Solved<Pack> solved = solve.run(alive, sweeps_.start(block), 0);
-    solved.evaluations.each(alive, [&](int l, int evaluations) { block.instances[l].evaluations += evaluations; });
-    displacement_map(tree_, work_.motion, work_.delta);
-    const Lanes doubtful = may_be_another_root(tree_, sweeps_.constants(), solved.done & extrapolates, solved.least_w, work_.delta,
-                                               [&](Index row) { return extrapolated(block, row); });
-    return finish(block, alive, solved.done & ~doubtful, solved.lost | doubtful);
+    const bool staged = stages_.size() > 1;
+    if (staged) keep_start();
+    Lanes together = alive, frozen = 0;
+    for (std::size_t stage = 0; stage < stages_.size() && together != 0; ++stage) {
+      if (staged) sweeps_.use_step(stages_[stage] * options_.step);
+      std::uint32_t* const past = block.past + stage * static_cast<std::size_t>(tree_.shape.velocities * kWords);
+      const Lanes done = solve(block, together, past);
+      frozen |= step_lost(block, together & ~done);
+      sweeps_.end(block, done);
+      if (done != 0) remember_displacement(block, done, past);
+      together = done;
+    }
+    for (Lanes left = together; left != 0; left &= left - 1) {
+      InstanceRecord& instance = block.instances[std::countr_zero(left)];
+      instance.displacements = static_cast<std::int8_t>(std::min(instance.displacements + 1, 2));
+      instance.steps += 1;
+    }
+    return alive & ~frozen;
   }
 
-  /// Takes the step in the lanes that are done, and of those that are lost each alone. Returns the lanes still alive.
-  Lanes finish(const Block<Real>& block, Lanes alive, Lanes done, Lanes lost) {
+  /// Returns the lanes in which a step, or sub-step, is solved.
+  Lanes solve(const Block<Real>& block, Lanes alive, const std::uint32_t* past) {
+    sweeps_.find_target();
+    const Lanes extrapolates = known(block);
+    first_guess(past, alive, extrapolates);
+    spread_mimics<Pack>(model_.mimics, work_.delta);  // corrections keep ties, so the guess must
+    Solve solve(sweeps_, kEffects ? kBlockWithEffects : kSmoothBlock);
+    const Solved<Pack> solved = solve.run(alive, sweeps_.start(block, alive), 0);
+    solved.evaluations.each(alive, [&](int l, int evaluations) { block.instances[l].evaluations += evaluations; });
+    sweeps_.factor().made().each(alive, [&](int l, int factors) { block.instances[l].factors += static_cast<std::uint32_t>(factors); });
+    displacement_map(tree_, work_.motion, work_.delta);
+    return solved.done & ~may_be_another_root(tree_, sweeps_.constants(), solved.done & extrapolates, solved.least_w, work_.delta,
+                                              [&](Index row) { return extrapolated(past, row); });
+  }
+
+  /// Where a step of sub-steps begins.
+  void keep_start() {
+    std::ranges::copy(sweeps_.q().flat(), start_q_.flat().begin());
+    std::ranges::copy(sweeps_.p().flat(), start_p_.flat().begin());
+  }
+
+  /// Takes the step in these lanes, each alone. Returns those that are frozen.
+  Lanes step_lost(const Block<Real>& block, Lanes lost) {
     Lanes frozen = 0;
+    if (lost != 0 && stages_.size() > 1) {
+      const auto back = [&](const Field<Pack>& from, Field<Pack>& to) {
+        for (Index row = 0; row < to.rows(); ++row) to(row) = select(L::mask(lost), from(row), to(row));
+      };
+      back(start_q_, sweeps_.q());
+      back(start_p_, sweeps_.p());
+    }
     for (Lanes left = lost; left != 0; left &= left - 1) {
       const int l = std::countr_zero(left);
       if (!step_alone(block, l)) frozen |= 1u << l;
     }
-    sweeps_.end(block, done);
-    if (done != 0) remember_displacement(block, done);
-    return alive & ~frozen;
+    return frozen;
   }
 
-  void remember_displacement(const Block<Real>& block, Lanes done) {
+  void remember_displacement(const Block<Real>& block, Lanes done, std::uint32_t* past) {
     std::array<std::int32_t, W> known;
-    for (int l = 0; l < W; ++l) {
-      known[static_cast<std::size_t>(l)] = -1;
-      if ((done >> l & 1u) == 0) continue;
-      InstanceRecord& instance = block.instances[l];
-      known[static_cast<std::size_t>(l)] = instance.displacements;
-      instance.displacements = static_cast<std::int8_t>(std::min(instance.displacements + 1, 2));
-      instance.steps += 1;
-    }
+    for (int l = 0; l < W; ++l) known[static_cast<std::size_t>(l)] = (done >> l & 1u) != 0 ? block.instances[l].displacements : -1;
     alignas(kAlignment) Real delta[W];
     for (Index row = 0; row < tree_.shape.velocities; ++row) {
       L::store(work_.delta(row), delta);
-      remember<W>(delta, known.data(), block.past + row * kWords);
+      remember<W>(delta, known.data(), past + row * kWords);
     }
   }
 
@@ -167,7 +201,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
         for (int k = 0; k < 10; ++k) inertia(i, k) = static_cast<double>(block.mass[(i * kMassRows + k) * W + l]);
       }
     }
-    if (block.instances[l].displacements == 0) return;
+    if (block.instances[l].displacements == 0 || stages_.size() > 1) return;
     for (Index row = 0; row < state.history.rows(); ++row) {
       state.history(row, 0) = static_cast<double>(remembered<Real>(block.past + row * kWords + l));
     }
@@ -186,9 +220,12 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   /// What the next step of lane l wants to know of one taken alone: its displacement; of one that was split, that of its last part, as if it
-  /// had been as long as a step.
+  /// had been as long as a step. Of sub-steps nothing is kept.
   void keep_alone(const Block<Real>& block, int l) {
+    sweeps_.factor().drop(l);
     if constexpr (kEffects) sweeps_.effects().keep_alone(block, l, alone_.controls());
+    block.instances[l].displacements = 0;
+    if (stages_.size() > 1) return;
     std::array<std::int32_t, W> known;
     known.fill(-1);
     known[static_cast<std::size_t>(l)] = 0;
@@ -229,6 +266,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   LaneSweeps<Pack, kEffects> sweeps_;
   Workspace<Pack>& work_;
   InstanceStepper alone_;
+  std::span<const double> stages_;  // lengths of sub-steps, in steps
+  Field<Pack> start_q_, start_p_;   // no rows where there is but one
 };
 
 }  // namespace linden

@@ -19,7 +19,7 @@ class TreeSolve {
 
   /// With which factor the first evaluation of a solve is to be made.
   Factor factor_for(int history) const {
-    return history > 0 && sweeps_.reuses_factor() && held_.serves(options_.tolerance) ? Factor::kept : Factor::fresh;
+    return history > 0 && sweeps_.reuses_factor() && held_.serves(options_.tolerance, held_.age()) ? Factor::kept : Factor::fresh;
   }
   /// Solves a step of h seconds from the evaluation of its first guess, made with that factor. What fails is told in the report.
   StepStatus run(Evaluated<double> now, Factor factor, double h, StepReport& report);
@@ -30,7 +30,7 @@ class TreeSolve {
   double failed_residual() const { return failed_residual_; }
   /// h^2 x kinetic energy that gravity gives in a step of h to what is at rest.
   double fall(double h) const { return fall_per_mass(options_.gravity, h) * sweeps_.constants().subtree_mass(0); }
-  HeldFactor& held() { return held_; }
+  HeldFactor<double>& held() { return held_; }
 
   // what solve.hpp asks
   Evaluated<double> evaluate(Lanes corrected, int round);
@@ -59,7 +59,7 @@ class TreeSolve {
   Policy policy_;
   TreeSweeps<kEffects>& sweeps_;
   Workspace<double>& work_;
-  HeldFactor held_;
+  HeldFactor<double> held_;
   Field<double> innovation_before_;  // of a correction that is searched along
   // of the solve there is
   StepReport* report_ = nullptr;

@@ -3,15 +3,17 @@
 // of W numbers, or one number; `kEffects` whether anything acts beside gravity. What a solution is, and what to do where there is none, is
 // not their business (engine/solve/solve.hpp).
 //
-//   start            start_down, newton_up            guess -> displacements, momenta; residual, Jacobian and its factor
+//   start            start_down                       guess -> displacements, momenta
+//                    (block_factor_up)                Jacobian and its factor, where that of an earlier step does not serve
+//                    innovation_up                    residual, first half of the solve
 //   evaluate         correct_down                     second half of a solve, corrected displacements, momenta
-//                    innovation_up (or newton_up)     residual, first half of the next solve
+//                    (block_factor_up), innovation_up the same
 //   end              advance_down, momentum_up        new positions, placements, forces, momenta
 //   read_velocity    mass_solve_up, rate_down         velocities of the momenta, where they are asked for
 //
-// Without effects the Jacobian is factored to first order at the guess, exactly at every second correction, and what lanes that are done have
-// found is kept aside while others go on. With effects the factor is exact and fresh at every evaluation, so that lanes that wait for
-// others compute what they had, and what becomes of a lane whose effects change their state depends on itself alone.
+// A factor is held from step to step (lane_factor.hpp); effects that stick, stop or saturate want one of the step itself. It is made anew where
+// a correction left more than a hundredth or a state changed. Lanes that wait for others compute what they had; without effects what they
+// found is kept aside, which takes less.
 #pragma once
 
 #include <array>
@@ -20,11 +22,14 @@
 #include "engine/effects/lane_effects.hpp"
 #include "engine/solve/block_stepper.hpp"
 #include "engine/solve/judge.hpp"
+#include "engine/sweeps/lane_factor.hpp"
 #include "kernels/block/advance_down.hpp"
+#include "kernels/block/block_factor_up.hpp"
 #include "kernels/block/lane_constants.hpp"
 #include "kernels/block/mass_solve_up.hpp"
 #include "kernels/effects/law.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
+#include "kernels/tree/increment_down.hpp"
 #include "kernels/tree/innovation_up.hpp"
 #include "kernels/tree/momentum_update_map.hpp"
 #include "kernels/tree/rounding_floor_map.hpp"
@@ -42,7 +47,8 @@ class LaneSweeps {
   static constexpr bool kAlone = false;
 
   explicit LaneSweeps(const BlockSetup<Real>& setup)
-      : tree_(setup.model.tree), options_(setup.options), constants_(setup.constants), effects_(setup) {
+      : tree_(setup.model.tree), options_(setup.options), constants_(setup.constants), step_(options_.step), effects_(setup),
+        factor_(setup.model, setup.holds_factor) {
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     if constexpr (!kEffects) kept_.allocate(shape);
@@ -53,7 +59,10 @@ class LaneSweeps {
     LaneGravity<Pack> gravity;
     gravity.fill(options_.gravity);
     set_gravity(gravity);
+    reduction_squared_ = options_.reduction * options_.reduction;
+    enough_ = number(0);
     const double tolerance = sizeof(Real) == sizeof(float) ? std::max(options_.tolerance, kSingleTolerance) : options_.tolerance;
+    tolerance_ = tolerance;
     tolerance_squared_ = number(tolerance * tolerance);
     for (Field<Pack>* field : {&work_.delta, &work_.force, &work_.innovation}) std::ranges::fill(field->flat(), number(0));
     std::ranges::fill(work_.impulse.flat(), number(0));
@@ -72,6 +81,7 @@ class LaneSweeps {
   Workspace<Pack>& work() { return work_; }
   const Workspace<Pack>& work() const { return work_; }
   auto& effects() { return effects_; }
+  LaneFactor<Pack>& factor() { return factor_; }
   Field<Pack>& q() { return q_; }
   Field<Pack>& p() { return p_; }
   /// Forces given from outside; null: none.
@@ -87,6 +97,7 @@ class LaneSweeps {
     if (has_applied_) load_rows(block.applied, applied_);
     constants_.use_masses(block.mass);
     if constexpr (kEffects) effects_.load(block);
+    factor_.load(block, work_);
     if (block.gravity != nullptr) use_gravity(own_gravity(block));
   }
   /// Of each instance; lanes that hold none have that of the options.
@@ -102,6 +113,13 @@ class LaneSweeps {
     for (Index row = 0; row < q_.rows(); ++row) L::store(q_(row), block.q + row * L::count);
     for (Index row = 0; row < p_.rows(); ++row) L::store(p_(row), block.p + row * L::count);
     if constexpr (kEffects) effects_.store(block);
+    factor_.store(block, work_);
+  }
+
+  /// Steps that come are of another length [s], negative ones back in time.
+  void use_step(double h) {
+    step_ = h;
+    set_gravity(gravity_of_lanes_);
   }
 
   /// Placements of the positions as they are.
@@ -119,27 +137,46 @@ class LaneSweeps {
     return of_gravity_;
   }
 
-  void find_target() { momentum_target_map(tree_, number(options_.step), p_, work_.force, work_.momentum_target); }
+  void find_target() { momentum_target_map(tree_, number(step_), p_, work_.force, work_.momentum_target); }
 
   /// The evaluation of the first guess in work().delta. Without effects nobody judges it (kSmoothBlock): of what start_down finds on its way
   /// nothing is asked, and a compiler leaves it out, which is a fifth of that sweep.
-  Evaluated<Pack> start([[maybe_unused]] const Block<Real>& block) {
+  Evaluated<Pack> start(const Block<Real>& block, Lanes alive) {
+    const Lanes due = alive & factor_.due(block, tolerance_);
+    Evaluated<Pack> now;
     if constexpr (kEffects) {
-      effects_.begin(block, options_.step, q_, work_);
+      effects_.begin(block, step_, q_, work_);
       const Evaluation<Pack> moved = start_down(tree_, constants_, work_);
       if (!effects_->plan().ground.points.empty()) effects_->guess_points(work_.displacement);
-      return evaluated(moved, true);
+      now = evaluated(moved, due, Jacobian::first_order);
     } else {
       start_down(tree_, constants_, work_);
-      return {.norm = newton_up<true>(tree_, constants_, work_)};
+      if (due != 0) make_factor<true>(due);
+      now.norm = pass_up();
     }
+    norm_ = guess_norm_ = now.norm;
+    changed_ = slow_ = 0;
+    enough_ = number(0);
+    return now;
   }
 
   // what solve.hpp asks
   Evaluated<Pack> evaluate(Lanes corrected, int round) {
-    return evaluated(correct_down(tree_, constants_, L::mask(corrected), work_), round % 2 == 0);
+    const Mask mask = L::mask(corrected);
+    const Evaluation<Pack> moved = tied() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
+    const Pack before = norm_;
+    const Evaluated<Pack> now = evaluated(moved, changed_ | (corrected & slow_), round % 4 == 0 ? Jacobian::exact : Jacobian::first_order);
+    changed_ = 0;
+    slow_ = (slow_ & ~corrected) | (corrected & ~L::bits(now.norm <= number(kWorn * kWorn) * before));
+    if (round == 1) {
+      factor_.first_correction(corrected, guess_norm_, now.norm, now.scale);
+      enough_ = enough(guess_norm_, now.scale);
+    }
+    return now;
   }
-  Lanes converged(const Evaluated<Pack>& now) const { return L::bits(within(now.norm, tolerance_squared_, now.scale)); }
+  Lanes converged(const Evaluated<Pack>& now) const {
+    return L::bits(within(now.norm, tolerance_squared_, now.scale)) | L::bits(now.norm <= enough_);
+  }
   Lanes close(const Evaluated<Pack>&) const { return 0; }
   Lanes at_floor(const Evaluated<Pack>& now, double epsilons) const {
     const Pack sum = rounding_floor_map(tree_, constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
@@ -150,7 +187,11 @@ class LaneSweeps {
     return false;
   }
   Lanes update_states([[maybe_unused]] const StateUpdate<Mask>& update) {
-    if constexpr (kEffects) return L::bits(effects_->update_states(work_.innovation, update, work_.delta));
+    if constexpr (kEffects) {
+      changed_ = L::bits(effects_->update_states(work_.innovation, update, work_.delta));
+      spread_mimics<Pack>(factor_.ties().mimics(), work_.delta);  // where a coordinate comes to hold, its leader's row was set
+      return changed_;
+    }
     return 0;
   }
   Lanes refused([[maybe_unused]] Lanes lanes) const {
@@ -162,6 +203,7 @@ class LaneSweeps {
       if (active == 0 && before != 0) bring_back(before);
       if (active != 0 && done != 0) keep(done);
     }
+    factor_.end(done, norm_, scale_, tolerance_);
   }
 
   /// The end of a step in these lanes, whose displacement in coordinates is in work().delta.
@@ -169,11 +211,11 @@ class LaneSweeps {
     const Mask moves = L::mask(done);
     if constexpr (kEffects) effects_.end(block, done, work_);
     advance(moves);
+    if (tied()) follow_leaders();
     update_momentum(moves);
-    if constexpr (kEffects) {
-      effects_.add_end(constants_, moves, work_, p_);
-      effects_.refresh(work_.placement, q_);
-    }
+    if constexpr (kEffects) effects_.add_end(constants_, moves, work_, p_);
+    fold_mimics(factor_.ties().mimics(), p_);
+    if constexpr (kEffects) effects_.refresh(work_.placement, q_);
   }
 
   /// M^-1 of what is on the right.
@@ -185,6 +227,7 @@ class LaneSweeps {
   void read_velocity() {
     if constexpr (kEffects) {
       effects_->begin_reading(p_);
+      fold_mimics(factor_.ties().mimics(), p_);
       effects_->with_reading([&](const auto& added) { find_rate(added); });
     } else {
       find_rate(NothingAdded{});
@@ -192,6 +235,11 @@ class LaneSweeps {
   }
 
  private:
+  /// An exact factor takes 1.7 times as long as one to first order in the turns of bodies in a step; that leaves their square of a correction.
+  enum class Jacobian : std::uint8_t { first_order, exact };
+  /// A correction that leaves more than this of the residual calls for another factor.
+  static constexpr double kWorn = 1e-2;
+
   /// Of a screw's motion the sweeps of a block write three numbers of seven.
   static void set_motion_identity(Field<Pack, 7>& motion) {
     for (Index i = 0; i < motion.rows(); ++i) {
@@ -201,9 +249,10 @@ class LaneSweeps {
 
   /// Not inline: the same numbers to the bit of whatever is its own in a lane, and of the options in all.
   [[gnu::noinline]] void set_gravity(const LaneGravity<Pack>& gravity) {
+    gravity_of_lanes_ = gravity;
     const auto along = [&](std::size_t k) { return of_each_lane<Pack>(gravity, [&](const std::array<double, 3>& g) { return g[k]; }); };
     gravity_ = {along(0), along(1), along(2)};
-    fall_per_mass_ = of_each_lane<Pack>(gravity, [&](const std::array<double, 3>& g) { return fall_per_mass(g, options_.step); });
+    fall_per_mass_ = of_each_lane<Pack>(gravity, [&](const std::array<double, 3>& g) { return fall_per_mass(g, step_); });
   }
   void use_gravity(const LaneGravity<Pack>& gravity) {
     has_gravity_ = true;
@@ -211,20 +260,62 @@ class LaneSweeps {
     if constexpr (kEffects) effects_.use_gravity(gravity);
   }
 
-  Gains<Pack> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+  /// Of the mass matrix, where a factor of the steps is not to be touched.
+  Gains<Pack> mass_gains() { return factor_.fresh(); }
 
-  /// The upward half; exact: with a factor made anew, as there always is with effects.
-  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, [[maybe_unused]] bool exact) {
+  /// What an order above 2 takes for solved, by what its first guess left.
+  Pack enough(const Pack& guess, const Pack& scale) const {
+    using std::min;
+    return number(reduction_squared_) * min(guess, number(2 * kRoughGuess * kRoughGuess) * scale);
+  }
+
+  /// The upward half, with a factor made anew in these lanes.
+  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes fresh, Jacobian kind) {
     Evaluated<Pack> now{.least_w = moved.least_w, .energy = moved.energy};
-    if constexpr (kEffects) {
-      now.norm = effects_.act(constants_, work_, now.energy);
-      now.scale = now.energy + fall();
-    } else {
-      now.norm = exact ? newton_up<false>(tree_, constants_, work_) : innovation_up(tree_, constants_, work_);
-      now.scale = now.energy;
-    }
+    if constexpr (kEffects) effects_.act(constants_, work_, now.energy);
+    if (fresh != 0) kind == Jacobian::exact ? make_factor<false>(fresh) : make_factor<true>(fresh);
+    now.norm = pass_up();
+    now.scale = kEffects ? now.energy + fall() : now.energy;
+    norm_ = now.norm;
+    scale_ = now.scale;
     return now;
   }
+  template <bool kFirstOrder>
+  void make_factor(Lanes lanes) {
+    const auto factor = [&](const auto& added) { block_factor_up<kFirstOrder>(tree_, constants_, work_, factor_.fresh(), added); };
+    const auto factor_tied = [&](const auto& added) { tied() ? factor(factor_.fresh_ties().held(added)) : factor(added); };
+    if constexpr (kEffects) {
+      effects_.with_added(factor_tied);
+    } else {
+      factor_tied(NothingAdded{});
+    }
+    if (tied()) tie([&](Field<Pack>& x) { increments(factor_.fresh(), x); });
+    factor_.take(lanes, work_);
+  }
+  /// Where joints are tied to each other, what becomes of a factor with them held. down(x): the second half of a solve with it.
+  template <class Down>
+  [[gnu::noinline]] void tie(const Down& down) {
+    const Gains<Pack> gains = factor_.fresh();
+    factor_.fresh_ties().factor(
+        [&](const Field<Pack>& r, Field<Pack>& x) {
+          impulse_pass_up(tree_, constants_, work_.placement, gains, r, work_.bias, work_.innovation);
+          down(x);
+        },
+        [&](Index i) { return tied_load(tree_, constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
+  }
+  void increments(const Gains<Pack>& gains, Field<Pack>& x) {
+    increment_down(tree_, constants_, work_.placement, work_.motion, gains, work_.innovation, work_.variation, x);
+  }
+  /// Residual and first half of a solve; of joints that are tied all of it, the correction in work_.increment. Returns the norm.
+  Pack pass_up() {
+    const Pack norm = innovation_up(tree_, constants_, work_);
+    if (!tied()) return norm;
+    increments({work_.gain_up, work_.gain_down, work_.joint_inverse}, work_.increment);
+    const Pack of_ties = factor_.ties().complete(work_.increment);
+    fold_mimics(factor_.ties().mimics(), work_.innovation);
+    return norm + of_ties;
+  }
+  bool tied() { return !factor_.ties().empty(); }
 
   Pack fall() const { return fall_per_mass_ * constants_.subtree_mass(0); }
 
@@ -237,24 +328,41 @@ class LaneSweeps {
     }
   }
   void update_momentum(const Mask& moves) {
-    const Pack h = number(options_.step);
+    const Pack h = number(step_);
     of_gravity_ = has_gravity_ ? momentum_up<true>(tree_, constants_, h, moves, applied(), work_, p_)
                                : momentum_up<false>(tree_, constants_, h, moves, applied(), work_, p_);
   }
 
   template <class Added>
   [[gnu::noinline]] void factor_mass(const Added& added) {
-    articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, gains(), added);
+    const auto factor = [&](const auto& all) {
+      articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, mass_gains(), all);
+    };
+    if (!tied()) return factor(added);
+    factor(factor_.fresh_ties().held(added));
+    tie([&](Field<Pack>& x) { rate_down(tree_, constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, x); });
   }
   template <class Added>
   [[gnu::noinline]] void find_rate(const Added& added) {
-    mass_solve_up(tree_, constants_, work_.placement, p_, work_.articulated, work_.gain_down, work_.joint_inverse, work_.bias,
-                  work_.innovation, added);
-    rate_down(tree_, constants_, work_.placement, gains(), work_.innovation, work_.variation, work_.increment);
+    if (tied()) {
+      factor_mass(added);
+      return apply_mass_inverse(p_, work_.increment);
+    }
+    const Gains<Pack> gains = mass_gains();
+    mass_solve_up(tree_, constants_, work_.placement, p_, work_.articulated, gains.down, gains.inverse, work_.bias, work_.innovation, added);
+    rate_down(tree_, constants_, work_.placement, gains, work_.innovation, work_.variation, work_.increment);
   }
   [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
-    impulse_pass_up(tree_, constants_, work_.placement, gains(), right_side, work_.bias, work_.innovation);
-    rate_down(tree_, constants_, work_.placement, gains(), work_.innovation, work_.variation, rate);
+    impulse_pass_up(tree_, constants_, work_.placement, mass_gains(), right_side, work_.bias, work_.innovation);
+    rate_down(tree_, constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, rate);
+    if (tied()) factor_.fresh_ties().complete(rate);
+  }
+  /// Followers to where their leaders are, without what rounding adds up to.
+  void follow_leaders() {
+    for (const Mimic& mimic : factor_.ties().mimics()) {
+      q_(mimic.follower_q) = as<Pack>(mimic.multiplier) * q_(mimic.leader_q) + as<Pack>(mimic.offset);
+    }
+    place();
   }
 
   [[gnu::noinline]] void keep(Lanes lanes) { blend(kept_, work_, L::mask(lanes)); }
@@ -275,14 +383,24 @@ class LaneSweeps {
   Options options_;
   BodyConstants<EachLane<Pack>> constants_;
   bool has_gravity_ = false, has_applied_ = false;
+  LaneGravity<Pack> gravity_of_lanes_;
   Vec3<Pack> gravity_;
   Pack fall_per_mass_;
+  double step_;  // h [s]
+  double tolerance_;
+  double reduction_squared_;
+  Pack enough_;  // squared energy norm of a residual that will do, beside the tolerance
   Pack tolerance_squared_;
   Pack of_gravity_;  // potential energy
   Workspace<Pack> work_;
   Kept<Pack> kept_;  // empty with effects
+  Pack guess_norm_;    // of the first guess of the solve there is
+  Pack norm_, scale_;  // of the last evaluation
+  Lanes changed_ = 0;  // states since then
+  Lanes slow_ = 0;     // lanes in which a correction left too much
   Field<Pack> q_, p_, applied_;
   [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;
+  LaneFactor<Pack> factor_;
 };
 
 }  // namespace linden

@@ -3,6 +3,7 @@
 //
 //   start_down     M_i = exp(S_i delta_i)
 //   correct_down   eta_i = Ad_{(X_i M_i)^-1} eta_parent + S_i Delta_i,   M_i <- M_i exp(-S_i Delta_i)         (increment_down)
+//   move_down      the same where Delta is there
 //   and in both    dT_i = X_i^-1 dT_parent X_i M_i,   hV_i = log dT_i,   h mu_i                               (displacement_down, momentum_map)
 //
 // The same arithmetic as the sweeps named at the right, body by body. One tree over its bodies is best served by those, whose maps can put
@@ -81,6 +82,24 @@ template <class S, class Element>
   });
 }
 
+/// The motion of joint i less its increment, in the lanes that are corrected.
+template <JointKind Kind, class S, class Mask, class Element>
+LINDEN_INLINE Displacement<S> corrected_motion(Joint<Kind> joint, const BodyConstants<Element>& constants, Index i, Index row,
+                                               const Displacement<S>& M, const Wrench<S>& increment, const Mask& active,
+                                               Workspace<S>& work) {
+  if constexpr (Kind == JointKind::screw) {
+    const S delta = work.delta(row) - select(active, increment.n.x, S(0.0));
+    work.delta(row) = delta;
+    return screw_motion(load_screw<S>(constants, i), delta);
+  } else {
+    const Displacement<S> N = M * joint_motion(joint, constants, i, row, work.increment, S(-1.0));
+    const auto pick = [&](const Vec3<S>& a, const Vec3<S>& b) {
+      return Vec3<S>{select(active, a.x, b.x), select(active, a.y, b.y), select(active, a.z, b.z)};
+    };
+    return Displacement<S>{{pick(N.r.v, M.r.v), select(active, N.r.w, M.r.w)}, pick(N.p, M.p)};
+  }
+}
+
 template <class S, class Mask, class Element>
 [[gnu::noinline]] Evaluation<S> correct_down(const Tree& tree, const BodyConstants<Element>& constants, const Mask& active,
                                              Workspace<S>& work) {
@@ -94,17 +113,16 @@ template <class S, class Mask, class Element>
     const Wrench<S> increment = joint_increment(joint, tree, gains, i, load_joint(joint, work.innovation, row), xi);
     store_joint(joint, work.increment, row, increment);
     store(work.variation, i, add_motion(joint, constants, i, increment, xi));
-    if constexpr (joint == JointKind::screw) {
-      const S delta = work.delta(row) - select(active, increment.n.x, zero);
-      work.delta(row) = delta;
-      return screw_motion(load_screw<S>(constants, i), delta);
-    } else {
-      const Displacement<S> N = M * joint_motion(joint, constants, i, row, work.increment, S(-1.0));
-      const auto pick = [&](const Vec3<S>& a, const Vec3<S>& b) {
-        return Vec3<S>{select(active, a.x, b.x), select(active, a.y, b.y), select(active, a.z, b.z)};
-      };
-      return Displacement<S>{{pick(N.r.v, M.r.v), select(active, N.r.w, M.r.w)}, pick(N.p, M.p)};
-    }
+    return corrected_motion(joint, constants, i, row, M, increment, active, work);
+  });
+}
+
+template <class S, class Mask, class Element>
+[[gnu::noinline]] Evaluation<S> move_down(const Tree& tree, const BodyConstants<Element>& constants, const Mask& active,
+                                          Workspace<S>& work) {
+  return evaluate_down(tree, constants, work, [&](auto joint, Index i, const Placement<S>&) {
+    const Index row = tree.first_v(i);
+    return corrected_motion(joint, constants, i, row, load_motion(joint, work.motion, i), load_joint(joint, work.increment, row), active, work);
   });
 }
 

@@ -8,12 +8,8 @@
 // difference E = F - b does, at half the cost. Where the residual vanishes E is F; what is left of u is handed on as r is
 // (momentum_update_map): the momentum of the whole tree stays exact.
 //
-//   innovation_up       with the gains there are
-//   newton_up           factors the Jacobian on the way (newton_factor_up): FirstOrder with K to first order, or with the exact K
-//
-// reads   screw 2 x n, inertia 10 x n, placement 12 x n, motion 7 x n, turn 3 x n or displacement 7 x n, momentum_target nv, impulse 6 x n
-//         holding h mu, (gains)
-// writes  impulse 6 x n (E), innovation nv (u), (articulated 36 x n: the children's share of Pi; gains)
+// reads   screw 2 x n, placement 12 x n, gains, momentum_target nv, impulse 6 x n holding h mu
+// writes  impulse 6 x n (E), innovation nv (u)
 // returns sum of |u.(d^-1 u)|, the squared energy norm of the residual (see impulse_pass_up)
 // source  the paper, Algorithm 2, lines 8 and 9; Featherstone, Rigid Body Dynamics Algorithms, 7.3
 #pragma once
@@ -112,53 +108,6 @@ template <class S, class Element>
 template <class S, class Element>
 S innovation_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work) {
   return innovation_up(tree, constants, all_slots(tree), work);
-}
-
-template <bool FirstOrder, class S, class Element, class Added = NothingAdded>
-[[gnu::noinline]] S newton_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work, const Added& added = {}) {
-  const Gains<S> gains{work.gain_up, work.gain_down, work.joint_inverse};
-  clear_world(work.impulse);
-  S norm(0.0);
-  up(tree, [&](auto joint, Index i) {
-    const Index row = tree.first_v(i), parent = tree.parent(i);
-    const auto G = load<Inertia, S>(constants.inertia, i);
-    Mat6<S> A;
-    if constexpr (FirstOrder) {
-      A = pose_derivative_first_order(G, load<Vec3, S>(work.turn, i));
-    } else {
-      const Twist<S> twist = log(load<Displacement, S>(work.displacement, i));
-      A = pose_derivative(G, twist, G * twist);
-    }
-    if constexpr (Added::to_bodies) A = A + Mat6<S>::from(added.body_stiffness.row(i));
-    if (tree.is_leaf(i) == 0) A = A + Mat6<S>::from(work.articulated.row(i));
-    A.to(work.articulated.row(i));
-    spill_here();
-    S reduced[36];
-    eliminate_joint(joint, tree, constants, i, work.articulated.row(i), gains, reduced, added);
-    spill_here();
-
-    const auto X = load<Placement, S>(work.placement, i);
-    S* const above = work.articulated.row(parent);
-    if constexpr (joint != JointKind::free) {
-      const auto X_pose = after_motion(joint, X, load_motion(joint, work.motion, i));
-      if (tree.is_last_child(i) != 0) {
-        to_parent(X, X_pose, reduced, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = value; });
-      } else {
-        to_parent(X, X_pose, reduced, [&](int at, const S& value) LINDEN_INLINE_LAMBDA { above[at] = above[at] + value; });
-      }
-    } else if (tree.is_last_child(i) != 0) {
-      for (int k = 0; k < 36; ++k) above[k] = S(0.0);
-    }
-    spill_here();
-
-    const auto E = load<Wrench, S>(work.impulse, i);
-    const Wrench<S> u = project(joint, constants, i, E) - load_joint(joint, work.momentum_target, row);
-    store_joint(joint, work.innovation, row, u);
-    const Wrench<S> passed = bias_to_parent(joint, tree, gains, i, E, -u, norm);
-    // through memory: six registers more to hold would cost more than they spare
-    store(work.impulse, parent, load<Wrench, S>(work.impulse, parent) + to_parent(X, passed));
-  });
-  return norm;
 }
 
 }  // namespace linden

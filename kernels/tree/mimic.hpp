@@ -83,6 +83,7 @@ class MimicTies {
     for (Field<S>& column : response_) column.allocate(tree.shape.velocities);
     felt_.assign(k * k, S(0.0));
     pull_.assign(k, S(0.0));
+    felt_now_.assign(k, S(0.0));
     stiffness_.allocate(tree.shape.velocities);
     given_.assign(k, S(0.0));
     inverse_.allocate(tree.shape.blocks);
@@ -139,14 +140,15 @@ class MimicTies {
     }
   }
 
-  /// Delta_0 -> Delta.
-  void complete(Field<S>& increment) {
+  /// Delta_0 -> Delta. Returns what the coordinates add to the squared energy norm of the residual, as impulse_pass_up has it.
+  S complete(Field<S>& increment) {
     const std::size_t k = leader_rows_.size();
     std::ranges::fill(pull_, S(0.0));
     for (const Member& member : members_) {
       S& pull = pull_[member.coordinate];
       pull = pull + as<S>(member.multiplier) * (as<S>(kHold<S>) * increment(member.row));
     }
+    felt_now_ = pull_;
     for (std::size_t i = 0; i < k; ++i) {
       for (std::size_t j = 0; j < i; ++j) pull_[i] = pull_[i] - felt_[i * k + j] * pull_[j];
     }
@@ -157,8 +159,21 @@ class MimicTies {
     for (std::size_t c = 0; c < k; ++c) {
       for (Index row = 0; row < increment.rows(); ++row) increment(row) = increment(row) + pull_[c] * response_[c](row);
     }
-    for (std::size_t c = 0; c < k; ++c) increment(leader_rows_[c]) = pull_[c];
+    using std::abs;
+    S norm(0.0);
+    for (std::size_t c = 0; c < k; ++c) {
+      increment(leader_rows_[c]) = pull_[c];
+      norm = norm + abs(felt_now_[c] * pull_[c]);
+    }
     spread_mimics<S>(mimics_, increment);
+    return norm;
+  }
+
+  /// visit(numbers) of all that a factor leaves here: numbers is a span.
+  template <class Visit>
+  void each(const Visit& visit) {
+    for (Field<S>& column : response_) visit(column.flat());
+    visit(std::span(felt_));
   }
 
   /// 1 / d of the factor's rows, where a tied row's is that of its coordinate times a^2: how far an impulse on the row moves it.
@@ -184,7 +199,7 @@ class MimicTies {
   std::vector<Field<S>> response_;  // X, a column a coordinate
   std::vector<S> felt_;             // T = L U
   std::vector<S> given_;            // stiffness that effects give each coordinate
-  std::vector<S> pull_;
+  std::vector<S> pull_, felt_now_;  // of the solve there is: how the coordinates move, and what they felt
   Field<S> stiffness_, inverse_;
   Field<S, 36> no_pull_;
 };

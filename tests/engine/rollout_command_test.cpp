@@ -116,13 +116,16 @@ TEST_CASE("a rollout with ground ends with a verdict", "[command line]") {
   CHECK(account["energy_band"].get<double>() < 0.05 * account["energy_taken"].get<double>());
 }
 
-TEST_CASE("single precision and mimic joints say what they cost", "[command line]") {
+TEST_CASE("single precision says what it costs, and orders above 2 and mimic joints are rolled out like all others", "[command line]") {
   const Shell shell;
   const Outcome single = shell.linden("rollout chain:4 --instances 20 --duration 0.01 --float");
   CHECK_THAT(single.out, Contains("single precision") && Contains("tolerance 3e-06"));
   const Outcome hand = shell.linden("rollout '" + kHand + "' --instances 3 --duration 0.01");
   CHECK(hand.exit_code == 0);
-  CHECK_THAT(hand.out, Contains("mimic joints"));
+  CHECK_THAT(hand.out, Contains(" instances (") && !Contains("taken alone"));
+  const Outcome fourth = shell.linden("rollout chain:4 --instances 3 --duration 0.01 --order 4");
+  CHECK(fourth.exit_code == 0);
+  CHECK_THAT(fourth.out, Contains("newton, order 4, step 0.001 s, tolerance 1e-12"));
 }
 
 TEST_CASE("more instances than the machine has memory for end in one line before they are made", "[command line]") {

@@ -45,7 +45,7 @@ class ScheduleStepper {
     } else {
       run({When::first, When::start});
     }
-    fresh_ = !(known && memory.strategy.reuses_factor && held_.serves(options.tolerance));
+    fresh_ = !(known && memory.strategy.reuses_factor && held_.serves(options.tolerance, held_.age()));
     evaluations = corrections = factorisations = 0;
     evaluate(fresh_ ? Factor::fresh : Factor::kept);
     held_.begin(std::sqrt(0.5 * memory.now.norm / memory.now.scale), fresh_);
@@ -207,7 +207,7 @@ class ScheduleStepper {
   bool refactors_ = false;  // the evaluation there is gets another factor
   bool cuts_ = false;       // of the last correction a part is taken back
   Policy policy_{};
-  HeldFactor held_;
+  HeldFactor<double> held_;
   bool fresh_ = true;
 };
 

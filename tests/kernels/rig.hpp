@@ -169,7 +169,7 @@ void factor_newton(Rig<S>& rig, const Added& added = {}) {
     static_assert(std::is_same_v<Added, NothingAdded>);
     Rig<S> block = rig;
     start_down(block.tree, block.constants, block.work);
-    newton_up<false>(block.tree, block.constants, block.work);
+    block_factor_up<false>(block.tree, block.constants, block.work, block.gains());
     rig.work.gain_up = block.work.gain_up;
     rig.work.gain_down = block.work.gain_down;
     rig.work.joint_inverse = block.work.joint_inverse;

@@ -81,7 +81,7 @@ CASES: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
         lambda: linden.Simulation(MODELS / "arm.urdf", effects={"limits": "urdf"}, initial={"positions": {"joint_4": 9.0}}),
         ("joint_4", "9"),
     ),
-    "a batch of order 4": (lambda: linden.Batch("chain:3", 2, order=4), ("order", "4")),
+    "a batch of order 3": (lambda: linden.Batch("chain:3", 2, order=3), ("order", "3")),
     # state
     "q of another length": (assigned(chain, "q", [1, 2]), ("q", "[2]", "[3]")),
     "q of two dimensions": (assigned(chain, "q", [[1, 2, 3]]), ("q", "[1, 3]", "[3]")),
