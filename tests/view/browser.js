@@ -36,6 +36,7 @@ export function fileOf(motion) {
 async function openAddress(browser, address, hash, offline, { width = 1280, height = 800, scale = 1, ...context }) {
   const surroundings = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: scale, ...context });
   if (offline) await surroundings.setOffline(true);
+  surroundings.setDefaultTimeout(0);
   const page = await surroundings.newPage();
   const complaints = [];
   page.on('console', (message) => {
