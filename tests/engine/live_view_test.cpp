@@ -68,14 +68,14 @@ TEST_CASE("bytes of strangers end their own connection and nothing else") {
   if (!shows_pages()) return;
   LiveProgram program("chain:2");
   std::mt19937 random(7);
-  for (int k = 0; k < 150; ++k) {
+  for (int k = 0; k < 100; ++k) {
     Client client(program.port());
     client.send(noise(random, 3000, "GET /stream HTTP/1.1\r\nHost: localhost\r\n" + kUpgrade + "\r\n"));
     client.end();
     client.read_to_end();
   }
   // frames of the protocol, torn and false, of a watcher
-  for (int k = 0; k < 60; ++k) {
+  for (int k = 0; k < 40; ++k) {
     LiveClient watcher(program);
     watcher.send_bytes(noise(random, 300, std::string("\x81\x8d\0\0\0\0{\"do\":\"run\"}", 19)));
   }
@@ -185,7 +185,7 @@ TEST_CASE("a watcher who never reads keeps neither the simulation nor another wa
   std::size_t bytes = 0;
   LiveHead head{};
   int frames = 0;
-  while (bytes < (8U << 20)) {
+  while (bytes < (5U << 19)) {
     const std::string frame = watcher.frame();
     const LiveHead now = LiveClient::head(frame);
     CHECK(now.steps > head.steps);
@@ -193,7 +193,7 @@ TEST_CASE("a watcher who never reads keeps neither the simulation nor another wa
     bytes += frame.size();
     ++frames;
   }
-  CHECK(frames > 100);
+  CHECK(frames > 50);
   // what the deaf one finds in the end are frames of long ago and then those of now: the others were left out
   LiveHead heard = LiveClient::head(deaf.frame());
   int read = 1;

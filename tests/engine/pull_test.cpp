@@ -40,7 +40,7 @@ TEST_CASE("what is pulled is lifted, and hangs as far below its place as its wei
   const Index pelvis = place_of(simulation.model(), "pelvis").slot;
   const Pull pull{pelvis, {}, {0.2, -0.1, 0.6}};
   pulls.set(1, pull);
-  pulled(simulation, pulls, 20'000);
+  pulled(simulation, pulls, 5000);
   // limbs swing on without an end, and the pelvis with them
   const std::array<double, 3> there = place_of_body(simulation, "pelvis");
   CHECK(std::abs(there[2] - (pull.to[2] - 9.81 / 81)) < 0.1);
@@ -75,10 +75,10 @@ TEST_CASE("a pull gives no more energy than its spring holds, at a light body as
   cases.push_back({load_urdf(kModels + "/humanoid.urdf", Base::floating), "pelvis"});
   cases.push_back({load_urdf(kModels + "/humanoid.urdf", Base::floating), "left_hand"});
   cases.push_back({load_model("chain:10", {}), ""});
-  cases.push_back({load_model("chain:200", {}), ""});
+  cases.push_back({load_model("chain:50", {}), ""});
   cases.push_back({load_urdf(kModels + "/hand.urdf", Base::fixed), ""});
   for (const Case& one : cases) {
-    for (const double step : {1e-4, 1e-3, 4e-3}) {
+    for (const double step : {1e-3, 4e-3}) {
       Simulation simulation(one.model, {.step = step, .gravity = {0, 0, 0}});
       const Index slot = one.body.empty() ? simulation.model().tree.shape.slots - 1 : place_of(simulation.model(), one.body).slot;
       std::array<double, 3> to = place_of_body(simulation, simulation.model().names.body[static_cast<std::size_t>(slot)]);
@@ -91,7 +91,7 @@ TEST_CASE("a pull gives no more energy than its spring holds, at a light body as
       const double begin = energy_with(simulation, pull, mass);
       INFO(simulation.model().names.model << " " << one.body << " step " << step);
       double most = 0;
-      for (int k = 0; k < 20; ++k) {
+      for (int k = 0; k < 10; ++k) {
         pulled(simulation, pulls, static_cast<int>(0.05 / step));
         most = std::max(most, energy_with(simulation, pull, mass));
       }
@@ -111,9 +111,9 @@ TEST_CASE("a pull from far away is no stronger than ten weights") {
     double way = 0;
     std::array<double, 3> before = place_of_body(simulation, body);
     // to and fro, as somebody would who tries to break it
-    for (int k = 0; k < 40; ++k) {
+    for (int k = 0; k < 20; ++k) {
       pulls.set(1, {slot, {0.01, 0, 0}, {k % 2 == 0 ? 1e5 : -1e5, k % 3 - 1.0, 1e3}});
-      for (int s = 0; s < 50; ++s) {
+      for (int s = 0; s < 25; ++s) {
         pulled(simulation, pulls, 1);
         const std::array<double, 3> now = place_of_body(simulation, body);
         way += distance(now, before);

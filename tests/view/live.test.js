@@ -61,9 +61,9 @@ async function until(page, condition) {
 const running = (now) => now.connected && now.state === 'running';
 const paused = (now) => now.state === 'paused';
 
-/** Opens the page of a simulation, runs the test's body, and asks that the page had nothing to complain of. */
+/** Opens the page of a simulation, small since it is drawn all the time, runs the test's body, and asks that the page had nothing to complain of. */
 async function watch(server, options, work) {
-  const opened = await openLive(browser, server.address, options);
+  const opened = await openLive(browser, server.address, { width: 760, height: 480, ...options });
   try {
     silent(opened);
     await work(opened.page, server);
@@ -143,7 +143,7 @@ withLive('a slider called after its joint moves the servo, and follows what othe
     const now = window.linden.pose(name);
     return Math.hypot(...[0, 1, 2].map((k) => now[k] - place[k])) > 0.1;
   }, [end, from]);
-  const other = await openLive(browser, server.address);
+  const other = await openLive(browser, server.address, { width: 300, height: 200 });
   await until(other.page, (now) => now.connected && now.watchers === 2);
   await other.page.evaluate((value) => window.linden.send({ do: 'target', servo: 1, value }), before.targets[1]);
   await poll(page, ([label, value]) => {
@@ -156,7 +156,7 @@ withLive('a slider called after its joint moves the servo, and follows what othe
 
 withLive('a body that is pulled with shift follows the pointer, with a line for all who watch, until it is let go', [drop], {}, async (page, server) => {
   await until(page, (now) => now.connected && now.seconds > 0.2);
-  const other = await openLive(browser, server.address);
+  const other = await openLive(browser, server.address, { width: 300, height: 200 });
   const from = await page.evaluate(() => window.linden.pose('head'));
   const view = await page.evaluate(() => window.linden.view());
   const { x, y } = await page.evaluate(() => window.linden.project('head'));
@@ -254,7 +254,7 @@ test('names with HTML in them are text, of joints and bodies and servos', async 
   assert.equal((await server.end()).code, 0);
 });
 
-for (const [name, options] of [['light', {}], ['dark', { colorScheme: 'dark' }], ['narrow', { width: 390, height: 780, hasTouch: true }]]) {
+for (const [name, options] of [['light', { width: 1280, height: 800 }], ['dark', { width: 1280, height: 800, colorScheme: 'dark' }], ['narrow', { width: 390, height: 780, hasTouch: true }]]) {
   withLive(`a picture for people: ${name}`, [drop], options, async (page) => {
     await until(page, (now) => now.connected && now.seconds > 1.5);
     await page.evaluate(() => window.linden.layers({ forces: true }));
@@ -262,7 +262,7 @@ for (const [name, options] of [['light', {}], ['dark', { colorScheme: 'dark' }],
     await page.click('#servos-button');
     await picture(page, `live_${name}`);
     const box = await page.locator('#bar').boundingBox();
-    assert.ok(box.x >= 0 && box.x + box.width <= (options.width ?? 1280));
+    assert.ok(box.x >= 0 && box.x + box.width <= (options.width ?? 760));
     const over = await page.evaluate(() => document.documentElement.scrollWidth > document.documentElement.clientWidth);
     assert.equal(over, false);
   });

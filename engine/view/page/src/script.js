@@ -12,7 +12,7 @@
 //   theme('light' or 'dark')
 //   select(body)          name, number, 'name,instance' or null
 //   project(body, instance)   {x, y} of the body's origin in pixels of the page
-//   pose(body, instance)      place x y z [m] and quaternion x y z w of the body, as it was drawn last
+//   pose(body, instance)      place x y z [m] and quaternion x y z w of the body
 //   live()                    of a running simulation {connected, state, seconds, steps, speed, pace, slow, message, refusal, targets, pulls,
 //                             frames: that were received}; null of a recording
 //   send(command)             of a running simulation: as engine/view/live.hpp has commands

@@ -170,6 +170,7 @@ export class View {
 
   /** Numbers of a body's pose, without the offset of its instance. */
   poseOf(body, instance) {
+    if (this.#moved) this.#update();
     const o = (instance * this.recording.bodies.length + body) * poseSize;
     return this.poses.subarray(o, o + poseSize);
   }
