@@ -12,7 +12,7 @@
 namespace linden {
 namespace {
 
-using nlohmann::json;
+using LiveJson = nlohmann::json;
 
 /// Numbers one behind the other, as they lie in memory.
 class FrameBytes {
@@ -35,12 +35,12 @@ class FrameBytes {
 constexpr std::string_view kCommands = "run, pause, step, reset, speed, target, pull or release";
 
 /// As it was written, short enough for a message.
-std::string written(const json& value) { return value.dump(-1, ' ', true, json::error_handler_t::replace).substr(0, 60); }
+std::string written(const LiveJson& value) { return value.dump(-1, ' ', true, LiveJson::error_handler_t::replace).substr(0, 60); }
 
 /// One command with its members.
 class LiveReader {
  public:
-  explicit LiveReader(std::string_view text) : object_(json::parse(text, nullptr, false)) {
+  explicit LiveReader(std::string_view text) : object_(LiveJson::parse(text, nullptr, false)) {
     if (!object_.is_object()) throw InputError(fmt::format("a command was {}; expected {{\"do\": ...}}", object_.is_discarded() ? "no JSON" : "no object"));
     const auto found = object_.find("do");
     if (found == object_.end() || !found->is_string()) throw InputError(fmt::format("a command does nothing; expected \"do\": {}", kCommands));
@@ -59,14 +59,14 @@ class LiveReader {
   }
 
   double number(const char* member, double least, double most) const {
-    const json& value = at(member);
+    const LiveJson& value = at(member);
     const double number = value.is_number() ? value.get<double>() : std::nan("");
     if (!(number >= least && number <= most)) wrong(member, value, fmt::format("a number from {:g} to {:g}", least, most));
     return number;
   }
 
   std::int64_t whole(const char* member, std::int64_t least, std::int64_t most) const {
-    const json& value = at(member);
+    const LiveJson& value = at(member);
     if (!value.is_number_integer() || (value.is_number_unsigned() && value.get<std::uint64_t>() > 1ULL << 62) || value.get<std::int64_t>() < least ||
         value.get<std::int64_t>() > most) {
       wrong(member, value, most < least ? "that there is one" : fmt::format("a whole number from {} to {}", least, most));
@@ -76,7 +76,7 @@ class LiveReader {
 
   std::array<double, 3> place(const char* member) const {
     constexpr double kFarthest = 1e6;  // [m]
-    const json& value = at(member);
+    const LiveJson& value = at(member);
     std::array<double, 3> place{};
     bool fine = value.is_array() && value.size() == 3;
     for (std::size_t k = 0; fine && k < 3; ++k) {
@@ -88,16 +88,16 @@ class LiveReader {
   }
 
  private:
-  const json& at(const char* member) const {
+  const LiveJson& at(const char* member) const {
     const auto found = object_.find(member);
     if (found == object_.end()) throw InputError(fmt::format("the command {} is without {}; expected it", name_, member));
     return *found;
   }
-  [[noreturn]] void wrong(const char* member, const json& value, const std::string& expected) const {
+  [[noreturn]] void wrong(const char* member, const LiveJson& value, const std::string& expected) const {
     throw InputError(fmt::format("the command {} has {} {}; expected {}", name_, member, written(value), expected));
   }
 
-  json object_;
+  LiveJson object_;
   std::string name_;
 };
 
@@ -161,7 +161,7 @@ LiveCommand live_command(std::string_view text, std::size_t bodies, std::size_t 
 }
 
 std::string live_error(std::string_view message) {
-  return json{{"is", "error"}, {"message", message}}.dump(-1, ' ', true, json::error_handler_t::replace);
+  return LiveJson{{"is", "error"}, {"message", message}}.dump(-1, ' ', true, LiveJson::error_handler_t::replace);
 }
 
 }  // namespace linden
