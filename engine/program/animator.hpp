@@ -21,6 +21,8 @@ class Animator {
   std::int64_t stride() const { return stride_; }
   /// A frame of the state that the simulation is in.
   void look();
+  /// Of all frames up to now none is kept; what a frame takes is used again.
+  void forget_frames() { recorder_.forget_frames(); }
   const Animation& animation() const { return recorder_.animation(); }
 
  private:

@@ -234,10 +234,15 @@ CLI::App* add_view(CLI::App& program, OptionTexts& texts, ViewCommandArguments& 
   add.start("Start", texts);
   add("Output", "--observe", texts.observe, "LIST", "curves beside those of joints and energy: pose:hand,com,contact:foot");
   add.views(texts, view.views);
+  command->add_flag("--live", view.views.live, "simulate now, in a page that can pause, pull at bodies and move servos; Ctrl-C ends it")->group("Live");
+  add("Live", "--port", texts.port, "P", "where the page is, default 8470; 0: any that is free");
+  add("Live", "--bind", texts.bind, "ADDRESS", "default 127.0.0.1, which this machine alone reaches");
   command->footer(
-      "Without one of --view, --gltf, --picture and --film the page is written as NAME.html in this folder.\n\n"
+      "Without one of --view, --gltf, --picture and --film the page is written as NAME.html in this folder. --live writes nothing:\n"
+      "it prints the address of a page, begins when that is opened, and goes on until Ctrl-C. --fps is how often it is drawn.\n\n"
       "Examples:\n"
       "  linden view models/humanoid.urdf\n"
+      "  linden view models/scenes/arm_servo.yaml --live\n"
       "  linden view models/scenes/humanoid_drop.yaml --picture drop.png --look azimuth=40,elevation=10\n"
       "  linden view motion.npz --model models/humanoid.urdf --base floating --gltf motion.glb");
   return command;

@@ -121,6 +121,27 @@ void read_randomize_option(const OptionTexts& texts, MotionArguments& motion) {
   if (!texts.randomize.empty()) randomize_from(texts.randomize, motion.effects(), motion.randomization);
 }
 
+/// What goes with --live, and nothing else.
+void read_live_options(const OptionTexts& texts, ViewCommandArguments& view) {
+  if (!view.views.live) {
+    if (texts.port.empty() && texts.bind.empty()) return;
+    throw InputError(fmt::format("{} says where --live shows the simulation: give --live too", texts.port.empty() ? "--bind" : "--port"));
+  }
+  if (is_recording(view.model)) throw InputError(fmt::format("--live simulates, and {} is a recording: leave --live out", view.model));
+  const ViewArguments& views = view.views;
+  for (const auto& [option, text] : {std::pair{"--view", views.view}, {"--gltf", views.gltf}, {"--picture", views.picture}, {"--film", views.film},
+                                     {"--moments", texts.views.moments}, {"--size", texts.views.size}, {"--look", texts.views.look},
+                                     {"--duration", texts.duration}}) {
+    if (!text.empty()) throw InputError(fmt::format("{}: --live shows the simulation until Ctrl-C and writes nothing; leave one of them out", option));
+  }
+  if (!texts.port.empty()) {
+    const std::int64_t port = integer_from("--port", texts.port, "a whole number from 0 to 65535, such as 8470");
+    if (port < 0 || port > 65535) throw InputError(fmt::format("--port {}: expected a whole number from 0 to 65535, such as 8470", port));
+    view.address.port = static_cast<std::uint16_t>(port);
+  }
+  if (!texts.bind.empty()) view.address.bind = texts.bind;
+}
+
 }  // namespace
 
 void read_run_options(const OptionTexts& texts, RunArguments& run) {
@@ -177,7 +198,8 @@ void read_accuracy_options(const OptionTexts& texts, AccuracyArguments& accuracy
 }
 
 void read_view_command_options(const OptionTexts& texts, ViewCommandArguments& view) {
-  if (!view.views.any()) view.views.view = usual_view(view.model);
+  read_live_options(texts, view);
+  if (!view.views.any() && !view.views.live) view.views.view = usual_view(view.model);
   if (is_recording(view.model)) {
     view.recording = view.model;
     if (texts.recorded.empty()) {

@@ -7,6 +7,7 @@
 
 #include "engine/initial_state.hpp"
 #include "engine/program/animator.hpp"
+#include "engine/program/live_view.hpp"
 #include "engine/program/recording_view.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
@@ -57,6 +58,7 @@ std::string usual_view(const std::string& model) {
 }
 
 int view_command(const ViewCommandArguments& arguments) {
+  if (arguments.views.live) return live_view(arguments);
   if (!arguments.recording.empty()) return show_recording(arguments, arguments.recording);
   return arguments.moves ? run_command(arguments) : show_model(arguments);
 }

@@ -4,10 +4,12 @@
 //   MODEL      one frame, in its zero configuration or where --seed puts it; with --duration its motion
 //   SCENE      its motion, as `linden run` simulates it
 //   recording  the positions that --record wrote, with every array of numbers beside them as curves
+//   --live     MODEL or SCENE as it runs (engine/program/live_view.hpp)
 #pragma once
 
 #include <string>
 
+#include "engine/program/live_server.hpp"
 #include "engine/program/run_command.hpp"
 
 namespace linden {
@@ -16,6 +18,7 @@ struct ViewCommandArguments : RunArguments {
   std::string recording;    // what --record wrote of the model; empty: none
   std::int64_t shown = 16;  // instances of it, from the first on
   bool moves = false;       // is simulated; else one frame is shown
+  LiveAddress address;      // of a simulation that is shown while it runs
 };
 
 /// What is written where nothing was asked for: models/humanoid.urdf -> humanoid.html, chain:10 -> chain-10.html.

@@ -207,14 +207,6 @@ std::string write_film(const ViewArguments& arguments, const Animation& animatio
   return counted(count, "frame");
 }
 
-/// What had to be left out, the first five of it.
-void tell_drawing(const Drawing& drawing) {
-  constexpr std::size_t kMost = 5;
-  const std::size_t told = std::min(kMost, drawing.warnings.size());
-  for (std::size_t k = 0; k < told; ++k) tell("warning: {}", drawing.warnings[k]);
-  if (told < drawing.warnings.size()) tell("warning: and {} more like these", drawing.warnings.size() - told);
-}
-
 std::string size_text(const std::string& file) {
   const auto bytes = static_cast<double>(std::filesystem::file_size(file));
   return bytes < 1e6 ? fmt::format("{:.0f} kB", bytes / 1e3) : fmt::format("{:.1f} MB", bytes / 1e6);
@@ -239,7 +231,7 @@ void read_view_options(const ViewTexts& texts, ViewArguments& arguments) {
   if (!texts.size.empty()) size_from(texts.size, arguments);
   if (!texts.look.empty()) arguments.look = look_from(texts.look, arguments.follow);
   if (!texts.moments.empty() && arguments.picture.empty()) throw InputError("--moments are those of a picture: give --picture FILE.png too");
-  if (!texts.fps.empty() && !arguments.any()) throw InputError("--fps says what --view, --gltf, --picture and --film take: give one of them too");
+  if (!texts.fps.empty() && !arguments.any() && !arguments.live) throw InputError("--fps says what --view, --gltf, --picture and --film take: give one of them too");
   if ((!texts.size.empty() || !texts.look.empty()) && arguments.picture.empty() && arguments.film.empty()) {
     throw InputError(fmt::format("{} is about pictures: give --picture FILE.png or --film FILE.mp4 too", texts.size.empty() ? "--look" : "--size"));
   }
@@ -263,6 +255,13 @@ std::vector<Output> outputs_of(const ViewArguments& arguments) {
           {"--gltf", arguments.gltf, {".glb"}},
           {"--picture", arguments.picture, {".png"}},
           {"--film", arguments.film, {".mp4"}}};
+}
+
+void tell_drawing(const Drawing& drawing) {
+  constexpr std::size_t kMost = 5;
+  const std::size_t told = std::min(kMost, drawing.warnings.size());
+  for (std::size_t k = 0; k < told; ++k) tell("warning: {}", drawing.warnings[k]);
+  if (told < drawing.warnings.size()) tell("warning: and {} more like these", drawing.warnings.size() - told);
 }
 
 WrittenViews write_views(const ViewArguments& arguments, const Animation& animation) {

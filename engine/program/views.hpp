@@ -26,6 +26,7 @@ struct ViewArguments {
   int width = 960, height = 720;          // [pixels]
   std::string look;                       // fragment of the page's address
   std::string follow;                     // body that it names; empty: none
+  bool live = false;                      // looked at while it runs, --live of view; the files are then none
 
   bool any() const { return !view.empty() || !gltf.empty() || !picture.empty() || !film.empty(); }
 };
@@ -42,6 +43,9 @@ void check_views(const ViewArguments& arguments, const Model& model, double dura
 
 /// The files among a command's outputs.
 std::vector<Output> outputs_of(const ViewArguments& arguments);
+
+/// Tells what the drawing had to do without, the first five of it.
+void tell_drawing(const Drawing& drawing);
 
 /// Tells what the drawing had to do without, then writes one file after the other; what each became, in words: "humanoid.html: 600 frames, 1.2 MB". A complaint goes to standard error.
 struct WrittenViews {

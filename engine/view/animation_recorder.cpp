@@ -81,6 +81,13 @@ void AnimationRecorder::add(double time, std::span<const double> positions, std:
   animation_.forces.push_back(std::move(forces));
 }
 
+void AnimationRecorder::forget_frames() {
+  animation_.times.clear();
+  animation_.poses.clear();
+  animation_.forces.clear();
+  for (Curve& curve : animation_.curves) curve.values.clear();
+}
+
 std::vector<DrawnForce> forces_of(const Simulation& simulation, std::int64_t instance) {
   std::vector<DrawnForce> forces;
   if (!simulation.keeps_forces()) return forces;

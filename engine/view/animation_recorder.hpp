@@ -33,6 +33,9 @@ class AnimationRecorder {
   /// of the positions that is not finite.
   void add(double time, std::span<const double> positions, std::span<const double> numbers = {}, std::vector<DrawnForce> forces = {});
 
+  /// Frames that were collected are forgotten; all else stays.
+  void forget_frames();
+
   /// What was collected up to now.
   const Animation& animation() const { return animation_; }
 

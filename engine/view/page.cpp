@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "engine/view/base64.hpp"
+#include "engine/view/live.hpp"
 #include "engine/view/page_template.hpp"
 
 namespace linden {
@@ -266,6 +267,14 @@ nlohmann::ordered_json header_of(const Animation& animation, const std::vector<R
           {"notes", animation.notes}};
 }
 
+nlohmann::ordered_json live_json(const LiveFacts& live) {
+  nlohmann::ordered_json servos = nlohmann::ordered_json::array();
+  for (const LiveServo& servo : live.servos) {
+    servos.push_back({{"name", servo.name}, {"unit", servo.unit}, {"least", servo.least}, {"most", servo.most}});
+  }
+  return {{"session", live.session}, {"step", live.step}, {"forces", live.most_forces}, {"weight", live.weight}, {"servos", servos}};
+}
+
 /// JSON that no HTML can be read in: a tag begins with <.
 std::string safe_json(const nlohmann::ordered_json& json) {
   const std::string text = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
@@ -281,9 +290,8 @@ std::string safe_json(const nlohmann::ordered_json& json) {
   return safe;
 }
 
-}  // namespace
-
-std::string page_of(const Animation& animation) {
+/// live: of a simulation that runs on from there; null: none does.
+std::string page_with(const Animation& animation, const LiveFacts* live) {
   const std::string_view page = page_template();
   constexpr std::string_view kPlace = "<!-- linden data -->";
   const std::size_t at = page.find(kPlace);
@@ -306,12 +314,20 @@ std::string page_of(const Animation& animation) {
 
   std::string result(page.substr(0, at));
   result += "<script type=\"application/json\" id=\"linden-header\">";
-  result += safe_json(header_of(animation, ranges, poses.grid()));
+  nlohmann::ordered_json header = header_of(animation, ranges, poses.grid());
+  if (live) header["live"] = live_json(*live);
+  result += safe_json(header);
   result += "</script>\n<script type=\"application/octet-stream;base64\" id=\"linden-data\">";
   result += base64(sections.packed());
   result += "</script>";
   result += page.substr(at + kPlace.size());
   return result;
 }
+
+}  // namespace
+
+std::string page_of(const Animation& animation) { return page_with(animation, nullptr); }
+
+std::string live_page_of(const Animation& start, const LiveFacts& live) { return page_with(start, &live); }
 
 }  // namespace linden

@@ -41,7 +41,7 @@
 // (2 k / 65535 - 1) / sqrt 2. Places (k modulo 2^32), rotations and curves are differences along F, modulo 2^16, the first frame whole: what
 // moves evenly repeats and packs well. `largest` is as it is.
 //
-// A page without data, for a stream: the header has "live": true, F = 0, and engine/view/live.hpp says what follows.
+// The page of a running simulation has the start as its only frame, and "live" in the header (engine/view/live.hpp says what follows).
 #pragma once
 
 #include <string>

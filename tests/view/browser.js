@@ -32,10 +32,11 @@ export function fileOf(motion) {
   return { address: pathToFileURL(path).href, bytes: text.length };
 }
 
-/** Opens a motion from disk, without a network. `complaints`: errors, warnings and requests of the page. */
-export async function open(browser, motion, { hash = '#t=0', width = 1280, height = 800, scale = 1, ...context } = {}) {
+/** Opens an address. `complaints`: errors, warnings and requests that go elsewhere. */
+async function openAddress(browser, address, hash, offline, { width = 1280, height = 800, scale = 1, ...context }) {
   const surroundings = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: scale, ...context });
-  await surroundings.setOffline(true);
+  if (offline) await surroundings.setOffline(true);
+  surroundings.setDefaultTimeout(0);
   const page = await surroundings.newPage();
   const complaints = [];
   page.on('console', (message) => {
@@ -43,7 +44,6 @@ export async function open(browser, motion, { hash = '#t=0', width = 1280, heigh
     if (['error', 'warning'].includes(message.type()) && !/GL Driver Message/.test(message.text())) complaints.push(message.text());
   });
   page.on('pageerror', (error) => complaints.push(String(error)));
-  const { address } = fileOf(motion);
   page.on('request', (request) => {
     if (!request.url().startsWith(address)) complaints.push(`asks for ${request.url().slice(0, 80)}`);
   });
@@ -55,6 +55,12 @@ export async function open(browser, motion, { hash = '#t=0', width = 1280, heigh
   const fault = await page.evaluate(() => window.linden.ready);
   return { page, fault, complaints, close: () => surroundings.close() };
 }
+
+/** Opens a motion from disk, without a network. */
+export const open = (browser, motion, { hash = '#t=0', ...options } = {}) => openAddress(browser, fileOf(motion).address, hash, true, options);
+
+/** Opens the page of a running simulation. */
+export const openLive = (browser, address, { hash = '', ...options } = {}) => openAddress(browser, address, hash, false, options);
 
 export const picture = (page, name) => page.screenshot({ path: join(folder, 'pictures', `${name}.png`) });
 

@@ -1,13 +1,17 @@
 // Forces of contacts as arrows from where they push, as long as they are strong.
 import { ConeGeometry, CylinderGeometry, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
 
-/** Newton that a metre of arrow stands for: strong pushes, but for the few strongest, are as long as a third of what is shown. */
-function scaleOf(forces, size) {
+/** How strong the strong pushes are, but for the few strongest [N]. */
+function strongOf(forces) {
   const strengths = [];
   const every = Math.max(1, Math.floor(forces.length / 8 / 20000));
   for (let i = 0; i < forces.length; i += 8 * every) strengths.push(Math.hypot(forces[i + 5], forces[i + 6], forces[i + 7]));
   strengths.sort((a, b) => a - b);
-  const strong = strengths[Math.floor(0.95 * (strengths.length - 1))] || 1;
+  return strengths[Math.floor(0.95 * (strengths.length - 1))] || 1;
+}
+
+/** Newton that a metre of arrow stands for: strong pushes are as long as a third of what is shown. */
+function scaleOf(strong, size) {
   const power = 10 ** Math.floor(Math.log10(strong / (0.35 * size)));
   return [1, 2, 5, 10].find((step) => step * power >= strong / (0.35 * size)) * power;
 }
@@ -17,7 +21,7 @@ export function makeArrows(recording, size) {
   object.visible = false;
   if (recording.mostForces === 0) return { object, newtonPerMetre: 0, place() {}, colour() {} };
 
-  const newtonPerMetre = scaleOf(recording.forces, size);
+  const newtonPerMetre = scaleOf(recording.strongForce || strongOf(recording.forces), size);
   const material = new MeshBasicMaterial({ toneMapped: false, depthTest: false, transparent: true })  // seen through feet;
   const thickness = 0.008 * size;
   const upright = (geometry) => geometry.translate(0, 0.5, 0).rotateX(Math.PI / 2);  // along z, from 0 to 1

@@ -13,7 +13,7 @@ export function makeBar(player, actions) {
   byId('of').textContent = ` / ${timeText(player.duration, digits)} s`;
   scrub.max = player.duration || 1;
   speed.replaceChildren(...speeds.map((value) => new Option(speedText(value), value)));
-  byId('start').addEventListener('click', () => player.go(0));
+  byId('start').addEventListener('click', player.start);
   byId('back').addEventListener('click', () => player.step(-1));
   byId('forward').addEventListener('click', () => player.step(1));
   play.addEventListener('click', player.toggle);
@@ -54,7 +54,7 @@ export function makeCard(view, recording, actions) {
   byId('arrangement').hidden = recording.instances < 2;
   for (const box of boxes) {
     box.disabled = !view.offered[box.dataset.layer];
-    if (box.disabled) box.parentElement.title = 'This recording has none';
+    if (box.disabled) box.parentElement.title = 'There is none here';
     box.addEventListener('change', () => actions.show({ [box.dataset.layer]: box.checked }));
   }
   if (view.newtonPerMetre) byId('force-scale').textContent = `1 m = ${view.newtonPerMetre} N`;
@@ -68,6 +68,7 @@ export function makeCard(view, recording, actions) {
   document.addEventListener('pointerdown', (event) => {
     if (!event.target.closest('#layers, #layers-button')) setOpen('layers-button', 'layers', false);
   });
+  byId('layers-button').addEventListener('click', () => setOpen('servos-button', 'servos', false));
 
   return () => {
     for (const box of boxes) box.checked = view.layers[box.dataset.layer];
@@ -107,16 +108,17 @@ export function tellAbout(recording) {
   document.title = `${title} – linden`;
   byId('title').textContent = title;
   const duration = `${Number(recording.duration.toPrecision(4))} s`;
-  const facts = [plural(recording.bodies.length, 'body', 'bodies'), duration, plural(recording.frames, 'frame')];
+  const facts = [plural(recording.bodies.length, 'body', 'bodies'), ...(recording.live ? ['live'] : [duration, plural(recording.frames, 'frame')])];
   if (recording.instances > 1) facts.unshift(plural(recording.instances, 'instance'));
   byId('facts').textContent = facts.join(' · ');
   byId('notes').textContent = recording.notes.join(' ');
   byId('notes').hidden = recording.notes.length === 0;
   const sentences = [`${title}: ${facts.join(', ')}.`];
   const { place, angle } = recording.error ?? {};
-  if (Number.isFinite(place) && Number.isFinite(angle)) {
+  if (!recording.live && Number.isFinite(place) && Number.isFinite(angle)) {
     sentences.push(`Poses are rounded: a place by at most ${place.toPrecision(2)} m, an angle by at most ${angle.toPrecision(2)} rad.`);
   }
-  sentences.push('Between frames, places and rotations are interpolated. Drawn with three.js, whose licence is in this file.');
+  if (!recording.live) sentences.push('Between frames, places and rotations are interpolated.');
+  sentences.push('Drawn with three.js, whose licence is in this file.');
   byId('about').textContent = sentences.join('\n');
 }

@@ -30,10 +30,8 @@ function element(name, className, text) {
   return made;
 }
 
-function makePlot({ group, unit, curves: all }, times, go) {
+function makePlot({ group, unit, curves: all }, recording, go) {
   const curves = changingMost(all);
-  const { least, most } = rangeOf(curves);
-  const nothing = 1e-7 * (most - least);  // what rounding leaves of a zero
   const figure = element('figure', 'plot');
   const caption = element('figcaption');
   const title = element('b', '', group);
@@ -47,7 +45,7 @@ function makePlot({ group, unit, curves: all }, times, go) {
     caption.append(entry);
     return { swatch, value, curve };
   });
-  if (all.length > curves.length) caption.append(element('span', 'entry', `${curves.length} of ${all.length}: those that change most`));
+  if (all.length > curves.length) caption.append(element('span', 'entry', `${curves.length} of ${all.length}${recording.live ? '' : ': those that change most'}`));
   const area = element('div', 'area');
   const canvas = element('canvas');
   canvas.setAttribute('role', 'img');
@@ -56,8 +54,7 @@ function makePlot({ group, unit, curves: all }, times, go) {
   area.append(canvas, cursor);
   figure.append(caption, area);
 
-  const duration = times[times.length - 1];
-  const goTo = (event) => go(timeOfPlace(event.clientX - area.getBoundingClientRect().left, area.clientWidth, duration));
+  const goTo = (event) => go(timeOfPlace(event.clientX - area.getBoundingClientRect().left, area.clientWidth, recording.span));
   area.addEventListener('pointerdown', (event) => {
     area.setPointerCapture(event.pointerId);
     goTo(event);
@@ -74,10 +71,12 @@ function makePlot({ group, unit, curves: all }, times, go) {
       entries.forEach(({ swatch }, c) => {
         swatch.style.borderTopColor = style.curves[c];
       });
-      drawPlot(canvas, curves, times, style);
+      drawPlot(canvas, curves, recording.times, recording.span, style);
     },
     show(seconds, frame) {
-      cursor.style.transform = `translateX(${placeOfTime(seconds, width, duration)}px)`;
+      cursor.style.transform = `translateX(${placeOfTime(seconds, width, recording.span)}px)`;
+      const { least, most } = rangeOf(curves);
+      const nothing = 1e-7 * (most - least);  // what rounding leaves of a zero
       for (const { value, curve } of entries) {
         const number = curve.value(frame);
         const text = numberText(Math.abs(number) < nothing ? 0 : number, curve.most - curve.least);
@@ -103,7 +102,7 @@ export function makePlots(holder, recording, go) {
   return {
     /** Shows curves of a body and instance; says how many plots that makes. */
     choose(body, instance) {
-      plots = groupsOf(recording.curves, body, instance).map((group) => makePlot(group, recording.times, go));
+      plots = groupsOf(recording.curves, body, instance).map((group) => makePlot(group, recording, go));
       holder.replaceChildren(...plots.map(({ figure }) => figure));
       draw();
       return plots.length;
@@ -112,6 +111,8 @@ export function makePlots(holder, recording, go) {
       now = { seconds, frame };
       for (const plot of plots) plot.show(seconds, frame);
     },
+    /** Draws curves that have changed. */
+    refresh: draw,
     colour(chosen) {
       style = chosen;
       draw();

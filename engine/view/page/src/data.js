@@ -46,7 +46,9 @@ function parseHeader(text) {
     const format = String(header.format).slice(0, 20);
     throw new DataError(`This page reads format 1, and its data is format ${format}: write the file again with one version of linden.`);
   }
-  if (header.live) throw new DataError('This page shows a running simulation: open it from the address that linden view --live prints.');
+  if (header.live && location.protocol === 'file:') {
+    throw new DataError('This page shows a running simulation: open it from the address that linden view --live prints.');
+  }
   for (const name of ['instances', 'frames', 'parts']) {
     if (!Number.isSafeInteger(header[name]) || header[name] < 0) throw damaged(`its header says ${name}: ${JSON.stringify(header[name])}`);
   }
@@ -60,10 +62,18 @@ function parseHeader(text) {
     if (![points, triangles].every((count) => Number.isSafeInteger(count) && count >= 0)) throw damaged('a mesh has no size');
   }
   const { grid } = header;
+  if (header.live) checkLive(header.live);
   if (!Array.isArray(grid) || grid.length !== 4 || !grid.every(Number.isFinite)) throw damaged('its header has no grid of places');
   if (header.frames === 0) throw new DataError('This motion has no frames: nothing was recorded, so there is nothing to show.');
   if (header.instances === 0) throw new DataError('This motion has no instances: nothing was recorded, so there is nothing to show.');
   return header;
+}
+
+/** What a page of a running simulation has to know. */
+function checkLive({ session, step, forces, weight, servos }) {
+  const sound = typeof session === 'string' && step > 0 && Number.isSafeInteger(forces) && forces >= 0 && Number.isFinite(weight) && Array.isArray(servos)
+    && servos.every(({ name, unit, least, most }) => typeof name === 'string' && typeof unit === 'string' && Number.isFinite(least) && Number.isFinite(most));
+  if (!sound) throw damaged('its header does not say what runs');
 }
 
 /** Where each section lies. How many forces there are is known from force_counts alone, so that `forces` takes what is left. */

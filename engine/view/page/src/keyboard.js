@@ -6,10 +6,10 @@ const layerKeys = ['visual', 'collision', 'inertia', 'frames', 'forces', 'ground
 export function watchKeys(player, actions) {
   const keys = {
     ' ': () => player.toggle(),
-    ArrowLeft: (event) => (event.shiftKey ? player.go(player.seconds - 1) : player.step(-1)),
-    ArrowRight: (event) => (event.shiftKey ? player.go(player.seconds + 1) : player.step(1)),
-    Home: () => player.go(0),
-    End: () => player.go(player.duration),
+    ArrowLeft: (event) => (event.shiftKey ? player.skip(-1) : player.step(-1)),
+    ArrowRight: (event) => (event.shiftKey ? player.skip(1) : player.step(1)),
+    Home: () => player.start(),
+    End: () => player.end(),
     ',': () => player.set({ speed: speeds[Math.max(0, speeds.indexOf(player.speed) - 1)] }),
     '.': () => player.set({ speed: speeds[Math.min(speeds.length - 1, speeds.indexOf(player.speed) + 1)] }),
     l: () => player.set({ loop: !player.loop }),
@@ -18,6 +18,8 @@ export function watchKeys(player, actions) {
     t: actions.theme,
     b: actions.bodies,
     c: actions.curves,
+    p: actions.pullMode,
+    s: actions.servos,
     '?': actions.help,
     Escape: actions.escape,
   };

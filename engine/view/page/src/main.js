@@ -4,8 +4,12 @@ import { byId, makeBar, makeCard, makeTheme, setOpen, tellAbout } from './contro
 import { curveStyle, groupsOf, makePlots } from './curves.js';
 import { DataError, readData } from './data.js';
 import { watchKeys } from './keyboard.js';
+import { makeLiveSource, openStream } from './live.js';
+import { makeLiveBar, makeServos } from './live_controls.js';
+import { makeLivePlayer } from './live_player.js';
 import { bodyAt, watchClicks } from './picking.js';
 import { makePlayer, speeds } from './player.js';
+import { watchPulls } from './pulling.js';
 import { makeRecording, momentOf } from './recording.js';
 import { offer } from './script.js';
 import { makeSide } from './side.js';
@@ -49,11 +53,12 @@ function start(recording, decodeMilliseconds) {
     return player.playing;
   });
   const view = new View(canvas, recording, loop.ask);
-  const player = makePlayer(recording.times, () => {
-    view.goTo(player.seconds);
-  });
+  const went = () => view.goTo(player.seconds);
+  const stream = recording.live ? openStream(recording, went) : null;
+  const player = stream ? makeLivePlayer(recording, stream) : makePlayer(recording.times, went);
   const actions = makeActions({ view, player, recording, loop });
-  const bar = makeBar(player, actions);
+  const bar = stream ? makeLiveBar(player, stream, actions) : makeBar(player, actions);
+  const live = stream ? startLive({ canvas, view, recording, stream, actions }) : null;
   const card = makeCard(view, recording, actions);
   const side = makeSide(view, recording, player, actions);
   const plots = makePlots(byId('plots'), recording, player.go);
@@ -71,6 +76,7 @@ function start(recording, decodeMilliseconds) {
     card();
     side.show(view.seconds, frame);
     if (!byId('dock').hidden) plots.show(view.seconds, frame);
+    live?.show();
     placeLabel(view, recording);
   };
   const fill = () => view.resize(byId('stage').clientWidth, byId('stage').clientHeight, Math.min(window.devicePixelRatio || 1, 2));
@@ -92,12 +98,39 @@ function start(recording, decodeMilliseconds) {
   actions.openCurves(groupsOf(recording.curves, -1, 0).length > 0 && window.innerHeight >= 500);
   fill();
   view.home();
-  const page = { view, player, recording, actions, theme, fill, draw, decodeMilliseconds };
+  const page = { view, player, recording, actions, theme, fill, draw, decodeMilliseconds, stream };
   offer(page);
   obey(readAddress(location.hash), page);
   draw();
   byId('page').dataset.state = 'ready';
   window.addEventListener('hashchange', () => obey(readAddress(location.hash), page));
+}
+
+/** What a page of a running simulation has beside the rest. */
+function startLive({ canvas, view, recording, stream, actions }) {
+  const pulls = watchPulls(canvas, view, recording, stream);
+  const servos = makeServos(recording, stream);
+  const redrawn = 100;  // [ms] between two drawings of curves
+  let last = -Infinity;
+  actions.pullMode = () => {
+    pulls.setMode(!pulls.mode);
+    byId('pull').setAttribute('aria-pressed', String(pulls.mode));
+  };
+  actions.servos = () => {
+    if (recording.live.servos.length > 0) setOpen('servos-button', 'servos', byId('servos').hidden);
+    setOpen('layers-button', 'layers', false);
+  };
+  byId('servos-button').addEventListener('click', actions.servos);
+  return {
+    show() {
+      servos();
+      const now = performance.now();
+      if (now - last < redrawn) return;
+      last = now;
+      if (!byId('side').hidden) actions.parts.side.refresh();
+      if (!byId('dock').hidden) actions.parts.plots.refresh();
+    },
+  };
 }
 
 /** The name of the chosen body, beside it. */
@@ -154,9 +187,12 @@ function makeActions({ view, player, recording, loop }) {
       if (count === 0 && byId('curves').disabled) actions.openCurves(false);
       loop.ask();
     },
+    pullMode() {},
+    servos() {},
     help: () => byId('help').showModal(),
     escape() {
       if (!byId('layers').hidden) setOpen('layers-button', 'layers', false);
+      else if (!byId('servos').hidden) setOpen('servos-button', 'servos', false);
       else if (view.selection) actions.select(null);
       else actions.openSide(false);
     },
@@ -186,6 +222,7 @@ function obey(asked, { view, player, recording, actions, theme, fill }) {
   if (asked.follow !== undefined) view.setFollow(bodyNamed(recording, asked.follow));
   else if (asked.view.target) view.setFollow(null);
   view.camera.set(asked.view);
+  if (recording.live) return;  // it runs, or not, for all who watch
   const still = window.matchMedia('(prefers-reduced-motion: reduce)').matches;
   const plays = asked.play ?? (asked.seconds === undefined && !still && window.top === window);
   if (plays) player.play();
@@ -196,7 +233,8 @@ async function run() {
   const begin = performance.now();
   try {
     const data = await readData(document);
-    const recording = makeRecording(data);
+    const recorded = makeRecording(data);
+    const recording = data.header.live ? makeLiveSource(recorded, data.header.live) : recorded;
     const decodeMilliseconds = performance.now() - begin;
     tellAbout(recording);
     start(recording, decodeMilliseconds);

@@ -3,16 +3,16 @@ import { Raycaster, Vector2, Vector3 } from 'three';
 
 const nearby = 8;  // pixels from a body's origin, where nothing larger is under the pointer
 
-/** Body and instance at a place of the page, or null. */
+/** {body, instance, point: where it was met [m]} at a place of the page, or null. */
 export function bodyAt(clientX, clientY, { canvas, camera, bodies, recording }) {
   const box = canvas.getBoundingClientRect();
   const place = new Vector2((clientX - box.left) / box.width * 2 - 1, 1 - (clientY - box.top) / box.height * 2);
   const ray = new Raycaster();
   ray.setFromCamera(place, camera);
   const shown = bodies.groups.filter((group) => group.shown).map(({ object }) => object);
-  for (const { object, instanceId } of ray.intersectObjects(shown, false)) {
+  for (const { object, instanceId, point } of ray.intersectObjects(shown, false)) {
     const owner = bodies.owner(object, instanceId);
-    if (owner && owner.body >= 0) return owner;
+    if (owner && owner.body >= 0) return { ...owner, point };
   }
   return nearestOrigin(place, box, { camera, bodies, recording });
 }
@@ -23,9 +23,10 @@ function nearestOrigin(place, { width, height }, { camera, bodies, recording }) 
   const origin = new Vector3();
   for (let instance = 0; instance < recording.instances; ++instance) {
     for (let body = 0; body < recording.bodies.length; ++body) {
-      bodies.originInto(body, instance, origin).project(camera);
+      const point = bodies.originInto(body, instance, new Vector3());
+      origin.copy(point).project(camera);
       const distance = Math.hypot((origin.x - place.x) * width / 2, (origin.y - place.y) * height / 2);
-      if (distance < least && origin.z < 1) [found, least] = [{ body, instance }, distance];
+      if (distance < least && origin.z < 1) [found, least] = [{ body, instance, point }, distance];
     }
   }
   return found;

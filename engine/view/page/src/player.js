@@ -26,6 +26,9 @@ export function makePlayer(times, changed) {
       player.playing = false;
       changed();
     },
+    start: () => player.go(0),
+    end: () => player.go(duration),
+    skip: (seconds) => player.go(player.seconds + seconds),
     toggle: () => (player.playing ? player.pause() : player.play()),
     set(settings) {
       Object.assign(player, settings);

@@ -54,27 +54,29 @@ export function rangeOf(curves) {
   return { least: least - room, most: most + room };
 }
 
-/** Least and most of a curve in each of `columns` columns; NaN where there is none. */
-export function thinned(curve, times, columns) {
+/** Least and most of a curve in each of `columns` columns of a span; NaN where there is none. */
+export function thinned(curve, times, { begin, duration }, columns) {
   const least = new Float64Array(columns).fill(NaN);
   const most = new Float64Array(columns).fill(NaN);
-  const scale = columns / (times[times.length - 1] || 1);
+  const scale = columns / (duration || 1);
   for (let f = 0; f < times.length; ++f) {
     const value = curve.value(f);
     if (value !== value) continue;
-    const column = Math.min(columns - 1, Math.floor(times[f] * scale));
+    const column = Math.min(columns - 1, Math.max(0, Math.floor((times[f] - begin) * scale)));
     if (!(least[column] <= value)) least[column] = value;
     if (!(most[column] >= value)) most[column] = value;
   }
   return { least, most };
 }
 
-export const timeOfPlace = (x, width, duration) => (x - margin.left) / (width - margin.left - margin.right) * duration;
-export function placeOfTime(seconds, width, duration) {
-  return margin.left + (duration ? seconds / duration : 0) * (width - margin.left - margin.right);
+export function timeOfPlace(x, width, { begin, duration }) {
+  return begin + (x - margin.left) / (width - margin.left - margin.right) * duration;
+}
+export function placeOfTime(seconds, width, { begin, duration }) {
+  return margin.left + (duration ? (seconds - begin) / duration : 0) * (width - margin.left - margin.right);
 }
 
-function drawAxes(pen, { width, height, least, most, duration, style }) {
+function drawAxes(pen, { width, height, least, most, span, style }) {
   pen.font = '11px system-ui, sans-serif';
   pen.lineWidth = 1;
   const y = (value) => margin.top + (most - value) / (most - least) * (height - margin.top - margin.bottom);
@@ -93,32 +95,31 @@ function drawAxes(pen, { width, height, least, most, duration, style }) {
     pen.fillText(texts[k], margin.left - 6, at, margin.left - 8);
   });
   pen.textBaseline = 'alphabetic';
-  for (const tick of ticksOf(0, duration, Math.max(2, Math.floor(width / 90)))) {
-    const x = placeOfTime(tick, width, duration);
+  for (const tick of ticksOf(span.begin, span.begin + span.duration, Math.max(2, Math.floor(width / 90)))) {
+    const x = placeOfTime(tick, width, span);
     pen.textAlign = x > width - 24 ? 'right' : 'center';
     pen.fillText(tickText(tick), Math.min(x, width - margin.right), height - 3);
   }
   return y;
 }
 
-/** Draws all; `style` has colours of curves, grid and muted text. */
-export function drawPlot(canvas, curves, times, style) {
+/** Draws what a span of time has of all; `style` has colours of curves, grid and muted text. */
+export function drawPlot(canvas, curves, times, span, style) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   if (width < margin.left + 20 || height < 30) return;
   const ratio = Math.min(window.devicePixelRatio || 1, 2);
   [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   const pen = canvas.getContext('2d');
   pen.scale(ratio, ratio);
-  const duration = times[times.length - 1];
   const { least, most } = rangeOf(curves);
-  const y = drawAxes(pen, { width, height, least, most, duration, style });
+  const y = drawAxes(pen, { width, height, least, most, span, style });
   pen.lineWidth = 1.5;
   pen.lineJoin = 'round';
   curves.forEach((curve, c) => {
     pen.strokeStyle = style.curves[c];
     pen.beginPath();
-    if (times.length <= 2 * width) traceFrames(pen, curve, times, (seconds) => placeOfTime(seconds, width, duration), y);
-    else traceColumns(pen, curve, times, width, y);
+    if (times.length <= 2 * width) traceFrames(pen, curve, times, (seconds) => placeOfTime(seconds, width, span), y);
+    else traceColumns(pen, curve, times, span, width, y);
     pen.stroke();
   });
 }
@@ -136,9 +137,9 @@ function traceFrames(pen, curve, times, x, y) {
   }
 }
 
-function traceColumns(pen, curve, times, width, y) {
+function traceColumns(pen, curve, times, span, width, y) {
   const columns = Math.floor(width - margin.left - margin.right);
-  const { least, most } = thinned(curve, times, columns);
+  const { least, most } = thinned(curve, times, span, columns);
   let drawing = false;
   for (let column = 0; column < columns; ++column) {
     const x = margin.left + column + 0.5;

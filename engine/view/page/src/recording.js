@@ -1,12 +1,14 @@
 // A motion as the page plays it. A source of motion offers
 //
 //   names         title, bodies, joints, parents, links, instances, ...
-//   times         [s] of its frames, rising, the first 0
+//   times         [s] of its frames, rising
+//   span          {begin, duration} that curves are drawn over [s]
 //   poseInto(moment, out)   poses of all instances and bodies at a moment {frame, fraction}: x y z and quaternion x y z w of each
 //   curves        numbers over time
 //   forcesOf(frame)
 //
-// and a recording offers it from what data.js read. Nothing is kept decoded.
+// and a recording offers it from what data.js read, its first time 0; a running simulation (live.js) from what it was sent. Nothing of a
+// recording is kept decoded.
 
 export const poseSize = 7;  // numbers: place x y z [m], quaternion x y z w
 
@@ -23,6 +25,7 @@ export function makeRecording({ header, sections, meshes }) {
     frames: header.frames,
     times,
     duration: times[times.length - 1],
+    span: { begin: 0, duration: times[times.length - 1] },
     bounds: sections.bounds,
     meshes,
     parts: partsOf(header, sections),

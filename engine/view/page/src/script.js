@@ -12,11 +12,19 @@
 //   theme('light' or 'dark')
 //   select(body)          name, number, 'name,instance' or null
 //   project(body, instance)   {x, y} of the body's origin in pixels of the page
+//   pose(body, instance)      place x y z [m] and quaternion x y z w of the body
+//   live()                    of a running simulation {connected, state, seconds, steps, speed, pace, slow, message, refusal, targets, pulls,
+//                             frames: that were received}; null of a recording
+//   send(command)             of a running simulation: as engine/view/live.hpp has commands
 //   statistics()          {triangles, calls, bodies, decodeMilliseconds}: of the picture drawn last, shadows included
 import { bodyNamed } from './address.js';
 import { byId } from './controls.js';
 
-export function offer({ view, player, recording, actions, theme, fill, draw, decodeMilliseconds }) {
+const liveFacts = ({ received, seconds, steps, pulls }, stream) => ({
+  connected: stream.connected, refusal: stream.refusal, ...stream.status, seconds, steps, frames: received, pulls: Array.from(pulls),
+});
+
+export function offer({ view, player, recording, actions, theme, fill, draw, decodeMilliseconds, stream }) {
   const known = (asked) => {
     const found = bodyNamed(recording, asked);
     if (!found && asked !== null && asked !== '') throw new RangeError(`there is no body ${JSON.stringify(asked)} in this motion`);
@@ -68,6 +76,9 @@ export function offer({ view, player, recording, actions, theme, fill, draw, dec
       const { x, y } = view.project(known(body).body, instance);
       return { x, y };
     },
+    pose: (body, instance = 0) => Array.from(view.poseOf(known(body).body, instance)),
+    live: () => (stream ? liveFacts(recording, stream) : null),
+    send: (command) => stream?.send(command),
     statistics() {
       const { triangles, calls } = view.renderer.info.render;
       return { triangles, calls, bodies: recording.bodies.length * recording.instances, decodeMilliseconds };

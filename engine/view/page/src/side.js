@@ -96,6 +96,7 @@ export function makeSide(view, recording, player, actions) {
       byId('body-follow').setAttribute('aria-pressed', String(followed));
       plots.show(seconds, frame);
     },
+    refresh: plots.refresh,
     colour: plots.colour,
   };
 }

@@ -8,6 +8,7 @@ import { makeCamera } from './camera.js';
 import { boxOfAll, extentOf, offsetsOf } from './extent.js';
 import { makeGround } from './ground.js';
 import { momentOf, poseSize } from './recording.js';
+import { makePullLines } from './pulling.js';
 import { makeStage, themes } from './stage.js';
 import { makeThreads } from './threads.js';
 
@@ -35,8 +36,10 @@ export class View {
     this.axes = makeAxes(recording, this.extent.size, this.poses);
     this.arrows = makeArrows(recording, this.extent.size);
     this.threads = makeThreads(recording);
+    this.pullLines = recording.live ? makePullLines(recording) : null;
     this.camera = makeCamera(canvas, changed);
     this.stage.scene.add(this.ground.object, this.arrows.object, this.threads.object, ...this.bodies.groups.map(({ object }) => object));
+    if (this.pullLines) this.stage.scene.add(this.pullLines.object);
     const hasLayer = (layer) => recording.parts.some((part) => part.layer === layer);
     /** Layers that this recording has something of. */
     this.offered = {
@@ -64,6 +67,7 @@ export class View {
     this.axes.place(this.bodies.places, this.bodies.slots);
     this.arrows.place(moment.frame, this.offsets);
     this.threads.place(this.bodies.places, this.bodies.slots);
+    this.pullLines?.place();
     this.camera.carry(this.follow ? this.bodies.originInto(this.follow.body, this.follow.instance, place) : null);
     this.#moved = false;
   }
@@ -124,6 +128,7 @@ export class View {
     this.ground.colour(this.#theme);
     this.arrows.colour(this.#theme);
     this.threads.colour(this.#theme);
+    this.pullLines?.colour(this.#theme);
     this.bodies.mark(this.selection, new Color(this.#theme.mark));
     this.changed();
   }
@@ -165,6 +170,7 @@ export class View {
 
   /** Numbers of a body's pose, without the offset of its instance. */
   poseOf(body, instance) {
+    if (this.#moved) this.#update();
     const o = (instance * this.recording.bodies.length + body) * poseSize;
     return this.poses.subarray(o, o + poseSize);
   }
