@@ -33,6 +33,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/files/array_file.hpp"
 #include "layout/names.hpp"
 
 namespace linden {
@@ -53,6 +54,12 @@ struct FixedArray {
   std::vector<std::string> columns;  // these
   std::vector<double> numbers;       // [N x columns], or [N]
 };
+
+/// Arrays called as another one is, or as what every recording has, are followed by _2.
+std::vector<RecordedArray> with_own_names(std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed);
+/// All that a recording consists of; names are different. The numbers of fixed arrays may be left out where the layout takes none.
+template <class Real>
+void declare(ArrayLayout& arrays, std::int64_t instances, const std::vector<RecordedArray>& recorded, const std::vector<FixedArray>& fixed);
 
 RecordedArray recorded_positions(const Names& names);
 RecordedArray recorded_velocities(const Names& names);
