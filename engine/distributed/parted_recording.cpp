@@ -12,18 +12,19 @@ namespace linden {
 
 template <class Real>
 PartedRecording<Real>::PartedRecording(Ranks& ranks, std::string file, std::int64_t instances, std::vector<RecordedArray> arrays,
-                                       std::vector<FixedArray> fixed)
+                                       std::vector<FixedArray> fixed, int packers)
     : PartedRecording(ranks, std::move(file), instances, std::move(arrays), std::move(fixed),
-                      {ranks.broadcast(ranks.first() ? Destination::letters() : ""), {}}) {}
+                      {ranks.broadcast(ranks.first() ? Destination::letters() : ""), {}}, packers) {}
 
 template <class Real>
 PartedRecording<Real>::PartedRecording(Ranks& ranks, std::string file, std::int64_t instances, std::vector<RecordedArray> arrays,
-                                       std::vector<FixedArray> fixed, RecordedParts done)
+                                       std::vector<FixedArray> fixed, RecordedParts done, int packers)
     : ranks_(ranks),
       file_(std::move(file)),
       instances_(instances),
       arrays_(with_own_names(std::move(arrays), fixed)),
       fixed_(std::move(fixed)),
+      packers_(packers),
       done_(std::move(done)),
       folder_(file_, done_.letters, !done_.segments.empty()) {
   if (const std::string ending = std::filesystem::path(file_).extension().string(); ending != ".h5") {
@@ -31,8 +32,10 @@ PartedRecording<Real>::PartedRecording(Ranks& ranks, std::string file, std::int6
   }
   const std::string fault = first_text(ranks_, fault_of([&] {
     if (!ranks_.first()) return;
-    if (done_.segments.empty()) folder_.make();
-    else folder_.take(done_.segments);
+    if (done_.segments.empty()) return folder_.make();
+    folder_.take(done_.segments);
+    write_master();  // before what it shows of later frames goes
+    folder_.clear_but(done_.segments);
   }));
   if (!fault.empty()) throw std::runtime_error(fault);
   begin_segment();
@@ -70,7 +73,7 @@ void PartedRecording<Real>::begin_segment() {
                                            ranks_.rank(), folder_.path()));
     }
     const std::int64_t own = share_of(instances_, ranks_.rank(), ranks_.count()).count;
-    part_.emplace(part_file_, own, arrays_, number == 0 ? fixed_ : std::vector<FixedArray>());
+    part_.emplace(part_file_, own, arrays_, number == 0 ? fixed_ : std::vector<FixedArray>(), packers_);
   }));
   if (!fault.empty()) throw std::runtime_error(fault);
   for (FixedArray& array : fixed_) array.numbers = {};
@@ -100,7 +103,7 @@ void PartedRecording<Real>::commit() {
 
 template <class Real>
 void PartedRecording<Real>::put_in_place() {
-  std::int64_t frames = part_->frames();
+  std::int64_t frames = part_ ? part_->frames() : 0;  // a segment that could not begin has none
   ranks_.least({&frames, 1});
   std::string fault;
   if (frames > 0) {
@@ -157,9 +160,7 @@ std::size_t PartedRecording<Real>::bytes_of_master() const {
 
 template <class Real>
 std::int64_t PartedRecording<Real>::frames() const {
-  std::int64_t frames = part_ ? part_->frames() : 0;
-  for (const RecordedSegment& segment : done_.segments) frames += segment.frames;
-  return frames;
+  return done_.frames() + (part_ ? part_->frames() : 0);
 }
 
 template class PartedRecording<double>;

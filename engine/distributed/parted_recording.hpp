@@ -28,24 +28,19 @@
 
 namespace linden {
 
-/// What is in place of a recording: all that is needed to go on with it.
-struct RecordedParts {
-  std::string letters;  // of the folder of its parts
-  std::vector<RecordedSegment> segments;
-};
-
 /// All functions but add, frames and parts are called by all ranks. They throw std::runtime_error: `FILE: cannot be written: reason`, and
 /// where it is thrown at one rank the same is at all; add throws it at the rank whose disk is full alone, after which commit keeps the frames
 /// before, as a RolloutFile does.
 template <class Real>
 class PartedRecording {
  public:
-  /// instances: of all ranks. fixed: of the own ones. Throws InputError for a name that does not end in .h5.
-  PartedRecording(Ranks& ranks, std::string file, std::int64_t instances, std::vector<RecordedArray> arrays, std::vector<FixedArray> fixed = {});
+  /// instances: of all ranks. fixed: of the own ones. packers: as a RolloutFile has them. Throws InputError for a name that does not end in .h5.
+  PartedRecording(Ranks& ranks, std::string file, std::int64_t instances, std::vector<RecordedArray> arrays, std::vector<FixedArray> fixed = {},
+                  int packers = 0);
   /// Goes on behind these segments, of whatever number of ranks; the numbers of fixed arrays are those of the first segment and are not read.
   /// What was recorded behind them is dropped.
   PartedRecording(Ranks& ranks, std::string file, std::int64_t instances, std::vector<RecordedArray> arrays, std::vector<FixedArray> fixed,
-                  RecordedParts done);
+                  RecordedParts done, int packers = 0);
   ~PartedRecording();
 
   /// A frame of the own instances, as RolloutFile::add.
@@ -76,6 +71,7 @@ class PartedRecording {
   std::int64_t instances_;
   std::vector<RecordedArray> arrays_;
   std::vector<FixedArray> fixed_;
+  int packers_;
   RecordedParts done_;
   PartsFolder folder_;
   std::optional<HeldRoom> room_;  // for the master, at rank 0

@@ -50,7 +50,8 @@ std::unique_ptr<ArrayFile> npz_file(const std::string& file);
 /// A table: a line of names, then one a row, of all arrays that have names for their numbers. Words are left out.
 std::unique_ptr<ArrayFile> csv_file(const std::string& file);
 
-/// For h5py.File: HDF5, every array a chunked dataset, written where it stays.
-std::unique_ptr<ArrayFile> h5_file(const std::string& file);
+/// For h5py.File: HDF5, every array a dataset in chunks (engine/files/h5_chunks.hpp), written where it stays. Up to 16 MiB of rows of each
+/// array wait in memory for their chunks to be full. packers: threads that compress them; 0: they stay as they are.
+std::unique_ptr<ArrayFile> h5_file(const std::string& file, int packers);
 
 }  // namespace linden

@@ -1,37 +1,21 @@
-// Numbers are datasets in chunks of about one row, without filters.
+// Numbers are datasets in chunks of some rows of some instances (h5_chunks.hpp), which are written when their rows are full.
 #include <hdf5.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "engine/files/array_file.hpp"
+#include "engine/files/h5_chunks.hpp"
 #include "engine/files/h5_output.hpp"
 
 namespace linden {
 namespace {
 
-// bytes of a chunk: every chunk takes a place in an index and a trip to the disk, and is read whole even where a part is asked for
-constexpr hsize_t kSmallestChunk = 1 << 16, kLargestChunk = 1 << 21;
-
-/// [rows, row...] of about one row.
-std::vector<hsize_t> chunk_of(std::span<const hsize_t> row, hsize_t element) {
-  std::vector<hsize_t> chunk{1};
-  hsize_t bytes = element;
-  for (const hsize_t size : row) {
-    chunk.push_back(std::max<hsize_t>(size, 1));
-    bytes *= chunk.back();
-  }
-  if (bytes < kSmallestChunk) chunk[0] = (kSmallestChunk + bytes - 1) / bytes;
-  for (std::size_t axis = 1; axis < chunk.size() && bytes > kLargestChunk; ++axis) {
-    const hsize_t whole = chunk[axis], parts = std::min(whole, (bytes + kLargestChunk - 1) / kLargestChunk);
-    chunk[axis] = (whole + parts - 1) / parts;
-    bytes = bytes / whole * chunk[axis];
-  }
-  return chunk;
-}
-
 class H5File final : public ArrayFile {
  public:
-  explicit H5File(const std::string& file) : out_(file) {}
+  H5File(const std::string& file, int packers) : out_(file), packers_(packers) {}
 
   void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string>) override {
     const auto [stored, native] = h5_types(type);
@@ -41,12 +25,13 @@ class H5File final : public ArrayFile {
       now.push_back(size);
       most.push_back(size > 0 ? size : H5S_UNLIMITED);  // no chunk is longer than an axis that cannot grow
     }
+    H5Chunks chunks(one_row, H5Tget_size(native));
+    const std::vector<hsize_t> sizes = chunks.sizes();
     const Handle creation = out_.creation();
-    const std::vector<hsize_t> chunk = chunk_of(one_row, H5Tget_size(native));
-    out_.call(H5Pset_chunk, creation.id(), static_cast<int>(chunk.size()), chunk.data());
-    hsize_t room = H5Tget_size(native) * chunk[0];
-    for (std::size_t axis = 1; axis < chunk.size(); ++axis) room *= (one_row[axis - 1] + chunk[axis] - 1) / chunk[axis] * chunk[axis];
-    arrays_.push_back({out_.create(name, stored, out_.space(now, most.data()), creation), out_.space(one_row), native, now, chunk[0], room});
+    out_.call(H5Pset_chunk, creation.id(), static_cast<int>(sizes.size()), sizes.data());
+    out_.call(H5Pset_shuffle, creation.id());
+    out_.call(H5Pset_deflate, creation.id(), 1u);
+    arrays_.push_back({out_.create(name, stored, out_.space(now, most.data()), creation), chunks, now, {}});
   }
 
   void describe(std::span<const std::string> names, const std::string& units) override {
@@ -64,56 +49,67 @@ class H5File final : public ArrayFile {
 
   void append(std::span<const void* const> rows) override {
     out_.require(true);
-    if (const int error = out_.disk().hold(row_room())) cannot_be_written(out_.target(), error);
-    for (std::size_t k = 0; k < rows.size(); ++k) append(arrays_[k], rows[k]);
+    std::size_t room = 0;
+    for (const Array& array : arrays_) room += array.chunks.room(array.waiting_rows() + 1);
+    if (const int error = out_.disk().hold(room)) cannot_be_written(out_.target(), error);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      Array& to = arrays_[k];
+      const auto* const row = static_cast<const std::byte*>(rows[k]);
+      to.waiting.insert(to.waiting.end(), row, row + to.chunks.row_bytes());
+      if (to.waiting_rows() == to.chunks.rows()) write(to);
+    }
     rows_ += 1;
   }
 
   std::int64_t rows() const override { return rows_; }
 
   void commit() override {
-    const std::int64_t all = std::exchange(rows_, 0);
-    for (Array& array : arrays_) out_.finish(array.dataset);
+    const auto all = static_cast<hsize_t>(std::exchange(rows_, 0));
+    for (Array& array : arrays_) {
+      write(array);
+      array.shape[0] = all;  // also of one whose rows have no numbers
+      out_.call(H5Dset_extent, array.dataset.id(), array.shape.data());
+      out_.finish(array.dataset);
+    }
     out_.publish();
-    rows_ = all;
+    rows_ = static_cast<std::int64_t>(all);
   }
 
  private:
   struct Array {
-    Handle dataset, row;         // row: one row in memory
-    hid_t type;                  // in memory
-    std::vector<hsize_t> shape;  // [rows, row...]
-    hsize_t chunk_rows;          // of a chunk
-    hsize_t chunk_bytes;         // of the chunks that a row lies in
+    Handle dataset;
+    H5Chunks chunks;
+    std::vector<hsize_t> shape;      // [rows, row...], of what is written
+    std::vector<std::byte> waiting;  // rows behind these, which fill no chunk yet
+
+    std::size_t waiting_rows() const { return waiting.empty() ? 0 : waiting.size() / chunks.row_bytes(); }
   };
 
-  /// Room that the next row of all arrays takes at most: chunks that begin with it, and places in their index.
-  hsize_t row_room() const {
-    constexpr hsize_t kOfStructure = 1 << 14;
-    hsize_t room = kOfStructure;
-    for (const Array& array : arrays_) {
-      if (array.shape[0] % array.chunk_rows == 0) room += array.chunk_bytes + kOfStructure;
+  void write(Array& array) const {
+    if (array.waiting.empty()) return;
+    std::vector<H5Chunks::Chunk> chunks(array.chunks.beside());
+    const hsize_t first = array.shape[0];
+    oneapi::tbb::task_arena(std::max(packers_, 1)).execute([&] {
+      oneapi::tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t k) {
+        chunks[k] = array.chunks.chunk(k, array.waiting, first, packers_ > 0);
+      });
+    });
+    array.shape[0] += array.waiting_rows();
+    array.waiting.clear();
+    out_.call(H5Dset_extent, array.dataset.id(), array.shape.data());
+    for (const H5Chunks::Chunk& chunk : chunks) {
+      out_.call(H5Dwrite_chunk, array.dataset.id(), H5P_DEFAULT, chunk.skipped, chunk.place.data(), chunk.bytes.size(), chunk.bytes.data());
     }
-    return room;
-  }
-
-  void append(Array& to, const void* row) {
-    std::vector<hsize_t> start(to.shape.size(), 0), count = to.shape;
-    start[0] = std::exchange(to.shape[0], to.shape[0] + 1);
-    count[0] = 1;
-    out_.call(H5Dset_extent, to.dataset.id(), to.shape.data());
-    const Handle place = out_.own(H5Sclose, H5Dget_space, to.dataset.id());
-    out_.call(H5Sselect_hyperslab, place.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
-    out_.call(H5Dwrite, to.dataset.id(), to.type, to.row.id(), place.id(), H5P_DEFAULT, row);
   }
 
   H5Output out_;
+  int packers_;  // threads
   std::vector<Array> arrays_;
   std::int64_t rows_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<ArrayFile> h5_file(const std::string& file) { return std::make_unique<H5File>(file); }
+std::unique_ptr<ArrayFile> h5_file(const std::string& file, int packers) { return std::make_unique<H5File>(file, packers); }
 
 }  // namespace linden

@@ -22,6 +22,14 @@ constexpr std::string_view kParts = ".parts";
 
 std::string file_of(std::size_t segment, int rank, int ranks) { return fmt::format("{}.{}-of-{}.h5", segment, rank, ranks); }
 
+std::set<std::string> files_of(std::span<const RecordedSegment> segments) {
+  std::set<std::string> files;
+  for (std::size_t k = 0; k < segments.size(); ++k) {
+    for (int rank = 0; rank < segments[k].ranks; ++rank) files.insert(file_of(k, rank, segments[k].ranks));
+  }
+  return files;
+}
+
 }  // namespace
 
 bool is_parts_folder(std::string_view name) {
@@ -64,14 +72,19 @@ void PartsFolder::make() {
 }
 
 void PartsFolder::take(std::span<const RecordedSegment> segments) {
-  namespace fs = std::filesystem;
   held_ = ::open(path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (held_ < 0) cannot_be_written(target_.file(), fmt::format("its parts {}: {}", path(), std::generic_category().message(errno)));
   if (!hold(held_)) cannot_be_written(target_.file(), fmt::format("another process writes its parts {}", path()));
-  std::set<std::string> needed;
-  for (std::size_t k = 0; k < segments.size(); ++k) {
-    for (int rank = 0; rank < segments[k].ranks; ++rank) needed.insert(file_of(k, rank, segments[k].ranks));
+  std::error_code ignored;
+  for (const std::string& part : files_of(segments)) {
+    if (std::filesystem::is_regular_file(std::filesystem::path(path()) / part, ignored)) continue;
+    cannot_be_written(target_.file(), fmt::format("its part {}/{} is not there; bring it back, or go on from an earlier checkpoint", path(), part));
   }
+}
+
+void PartsFolder::clear_but(std::span<const RecordedSegment> segments) const {
+  namespace fs = std::filesystem;
+  const std::set<std::string> needed = files_of(segments);
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(path(), error)) {
     if (!needed.contains(entry.path().filename().string())) fs::remove_all(entry.path(), error);

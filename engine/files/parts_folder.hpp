@@ -13,6 +13,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/files/destination.hpp"
 
@@ -23,6 +24,18 @@ struct RecordedSegment {
   std::int64_t frames;
   int ranks;
   bool operator==(const RecordedSegment&) const = default;
+};
+
+/// What is in place of a recording: all that is needed to go on with it.
+struct RecordedParts {
+  std::string letters;  // of the folder of its parts
+  std::vector<RecordedSegment> segments;
+
+  std::int64_t frames() const {
+    std::int64_t frames = 0;
+    for (const RecordedSegment& segment : segments) frames += segment.frames;
+    return frames;
+  }
 };
 
 /// Whether this is how such a folder is called once there is a master.
@@ -50,9 +63,10 @@ class PartsFolder {
 
   /// Makes the folder and holds it.
   void make();
-  /// Holds one that was kept, and removes all that is in it but the parts of these segments: what was begun and is not needed. Throws where
-  /// another process writes there.
+  /// Holds one that was kept. Throws where another process writes there, and where a part of these segments is not there.
   void take(std::span<const RecordedSegment> segments);
+  /// Removes all that is in it but the parts of these segments: what was begun and is not needed.
+  void clear_but(std::span<const RecordedSegment> segments) const;
   /// From now on it bears the name that the master refers to; who made it renames it, and others know of it afterwards.
   void keep();
 

@@ -20,10 +20,10 @@ namespace {
 const std::string kStatuses[] = {"converged", "not_converged", "past_pi", "gains_energy", "not_finite"};
 static_assert(std::size(kStatuses) == static_cast<std::size_t>(StepStatus::not_finite) + 1, "every status has a name");
 
-std::unique_ptr<ArrayFile> array_file(const std::string& file, std::int64_t instances) {
+std::unique_ptr<ArrayFile> array_file(const std::string& file, std::int64_t instances, int packers) {
   const std::string ending = std::filesystem::path(file).extension().string();
   if (ending == ".npz") return npz_file(file);
-  if (ending == ".h5") return h5_file(file);
+  if (ending == ".h5") return h5_file(file, packers);
   if (ending == ".csv" && instances == 1) return csv_file(file);
   cannot_be_written(file, fmt::format("the file's name ends in \"{}\"; expected .npz or .h5", ending));
 }
@@ -102,8 +102,8 @@ struct RolloutFile<Real>::Data {
 
 template <class Real>
 RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> recorded,
-                               const std::vector<FixedArray>& fixed)
-    : data_(new Data{file, instances, with_own_names(std::move(recorded), fixed), array_file(file, instances)}) {
+                               const std::vector<FixedArray>& fixed, int packers)
+    : data_(new Data{file, instances, with_own_names(std::move(recorded), fixed), array_file(file, instances, packers)}) {
   declare<Real>(*data_->arrays, instances, data_->recorded, fixed);
 }
 

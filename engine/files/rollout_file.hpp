@@ -69,7 +69,9 @@ class RolloutFile {
  public:
   /// FILE.npz, FILE.h5 or, of one instance, FILE.csv. Throws std::runtime_error, as add and commit do: `FILE: cannot be written: reason`.
   /// After that add throws again, and commit puts the frames before in place; nothing else is left in the folder.
-  RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed = {});
+  /// packers: threads that compress FILE.h5; 0: it is not compressed. No bit that is read back depends on it.
+  RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed = {},
+              int packers = 0);
   /// With q and v.
   RolloutFile(const std::string& file, const Names& names, std::int64_t instances)
       : RolloutFile(file, instances, {recorded_positions(names), recorded_velocities(names)}) {}

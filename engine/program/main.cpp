@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <new>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "engine/program/accuracy_command.hpp"
 #include "engine/program/inspect.hpp"
 #include "engine/program/option_texts.hpp"
+#include "engine/program/rollout_checkpoint.hpp"
 #include "engine/program/rollout_command.hpp"
 #include "engine/program/run_command.hpp"
 #include "engine/program/scaling_command.hpp"
@@ -153,19 +155,27 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
   add("Output", "--what", texts.what, "LIST", "of positions, velocities (default: both) and energies");
   add("Output", "--observe", texts.observe, "LIST", "observations beside it: pose:hand,com,imu:head; see linden run --help");
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
+  command->add_flag("--compress", rollout.compress, "a --record FILE.h5 is compressed, without loss: smaller, and slower to write")->group("Output");
   add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
+  add("Checkpoints", "--checkpoint", rollout.checkpoint, "DIR", "keep the state of all instances in this folder, to go on from");
+  add("Checkpoints", "--checkpoint-every", texts.checkpoint_every, "S", "seconds by the clock between two, default 600");
+  add("Checkpoints", "--keep", texts.keep, "N", "how many stay there, default the newest 2");
+  add("Checkpoints", "--resume", rollout.resume, "DIR", "go on, to the bit, from the newest one there; the other options as they were");
   add.views(texts, rollout.views);
   add("Pictures", "--shown", texts.shown, "N", "instances that are shown, default the first 16");
   command->footer(
       "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C, SIGTERM and SIGHUP end\n"
-      "a rollout early and keep its files; on a full disk it ends with what fits.\n\n"
+      "a rollout early and keep its files; on a full disk it ends with what fits. With --checkpoint it goes on from there, and from wherever it was\n"
+      "killed, as if nothing had happened (--resume).\n\n"
       "--randomize masses=0.2,friction=0.4:1.0,gains=0.1 draws for each instance, by its seed: a factor from 0.8 to 1.2 for the mass of each\n"
       "body, the friction of the ground from 0.4 to 1.0, a factor for the gains of each servo; joint_friction likewise. It goes over what a\n"
       "scene says, and what was drawn is in the --record file.\n\n"
       "Examples:\n"
       "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
       "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"
-      "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10");
+      "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10\n"
+      "  linden rollout models/arm.urdf --instances 4096 --duration 600 --record arms.h5 --every 100 --checkpoint state\n"
+      "  linden rollout models/arm.urdf --instances 4096 --duration 600 --record arms.h5 --every 100 --resume state");
   return command;
 }
 
@@ -340,6 +350,8 @@ int run_program(int argc, char** argv) {
   if (rollout->parsed()) {
     refuse_leftovers(*rollout, "linden rollout");
     read_rollout_options(texts, rollout_arguments);
+    const std::span<const char* const> words(argv, static_cast<std::size_t>(argc));
+    rollout_arguments.command_to_resume = command_to_resume(words, rollout_arguments.checkpoint);
     return rollout_command(rollout_arguments);
   }
   if (view->parsed()) {

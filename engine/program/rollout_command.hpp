@@ -6,6 +6,7 @@
 //   fails     an instance whose step fails is frozen at its last good state; the others go on, and the exit code is 1
 //   writes    files appear whole or not at all. A rollout that is interrupted leaves them valid up to its last step; where the recording
 //             finds no room it ends with the frames that did
+//   survives  with --checkpoint, whatever becomes of the process (engine/program/rollout_checkpoint.hpp)
 #pragma once
 
 #include <cstdint>
@@ -30,6 +31,11 @@ struct RolloutArguments : MotionArguments {
   std::vector<std::string> observe;  // names of observations beside it
   ViewArguments views;
   std::int64_t shown = 16;  // instances in them, from the first on
+  std::string checkpoint, resume;  // folders (engine/program/rollout_checkpoint.hpp), one where there are both; empty = none
+  bool compress = false;  // the recording
+  double checkpoint_every = 600;   // seconds by the clock
+  std::int64_t checkpoints_kept = 2;
+  std::string command_to_resume;  // as it is given to a shell
 };
 
 /// Returns the exit code: 0, 1 where an instance was frozen or a file could not be written, 128 + signal after one. Throws InputError

@@ -12,8 +12,10 @@
 #include "engine/program/progress.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
+#include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
 #include "engine/view/curves.hpp"
+#include "layout/support/input_error.hpp"
 
 namespace linden {
 
@@ -24,8 +26,11 @@ using Clock = Progress::Clock;
 }  // namespace
 
 template <class Real>
-RolloutExecution<Real>::RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
+RolloutExecution<Real>::RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Ranks& ranks,
+                                         RolloutCheckpoints* checkpoints)
     : arguments_(arguments),
+      ranks_(ranks),
+      checkpoints_(checkpoints),
       model_(std::move(model)),
       effects_(arguments.effects()),
       observations_(observations_of(*model_, effects_, arguments.observe)),
@@ -45,37 +50,48 @@ RolloutExecution<Real>::RolloutExecution(const RolloutArguments& arguments, std:
     return std::vector<double>(rows.begin(), rows.end());
   });
   figures_.bytes = batch_.bytes();
-  if (!arguments.record.empty()) {
-    what_ = arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what;
-    const Names& names = batch_.model().names;
-    std::vector<RecordedArray> arrays;
-    for (const Quantity quantity : what_) {
-      arrays.push_back(quantity == Quantity::positions    ? recorded_positions(names)
-                       : quantity == Quantity::velocities ? recorded_velocities(names)
-                                                          : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
-      numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
-    }
-    if (observations_) {
-      for (RecordedArray& array : recorded_observations(*observations_)) arrays.push_back(std::move(array));
-      observed_.resize(static_cast<std::size_t>(arguments.instances * observations_->width()));
-      observe();  // refuses accelerations where there are none
-    }
-    status_.resize(static_cast<std::size_t>(arguments.instances));
-    file_.emplace(arguments.record, arguments.instances, std::move(arrays), drawn.arrays());
-  }
   energy_.resize(static_cast<std::size_t>(arguments.instances));
+  if (!arguments.record.empty()) begin_recording(drawn.arrays());
+  if (checkpoints && checkpoints->resumed()) resume();
   if (arguments.views.any()) begin_views();
+}
+
+template <class Real>
+void RolloutExecution<Real>::begin_recording(const std::vector<FixedArray>& drawn) {
+  what_ = arguments_.what.empty() ? usual_quantities(arguments_.record) : arguments_.what;
+  const Names& names = batch_.model().names;
+  std::vector<RecordedArray> arrays;
+  for (const Quantity quantity : what_) {
+    arrays.push_back(quantity == Quantity::positions    ? recorded_positions(names)
+                     : quantity == Quantity::velocities ? recorded_velocities(names)
+                                                        : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
+    numbers_.emplace_back(static_cast<std::size_t>(arguments_.instances) * arrays.back().rows.size());
+  }
+  if (observations_) {
+    for (RecordedArray& array : recorded_observations(*observations_)) arrays.push_back(std::move(array));
+    observed_.resize(static_cast<std::size_t>(arguments_.instances * observations_->width()));
+    observe();  // refuses accelerations where there are none
+  }
+  status_.resize(static_cast<std::size_t>(arguments_.instances));
+  const int packers = arguments_.compress ? batch_.threads() : 0;
+  if (!checkpoints_) {
+    file_.emplace(arguments_.record, arguments_.instances, std::move(arrays), drawn, packers);
+  } else if (checkpoints_->recorded().segments.empty()) {
+    parts_.emplace(ranks_, arguments_.record, arguments_.instances, std::move(arrays), drawn, packers);
+  } else {
+    parts_.emplace(ranks_, arguments_.record, arguments_.instances, std::move(arrays), drawn, checkpoints_->recorded(), packers);
+  }
 }
 
 template <class Real>
 void RolloutExecution<Real>::steps(const Interrupt& interrupt) {
   Progress progress(figures_.steps_planned, arguments_.options.step);
   std::int64_t stretch = 1;  // steps between two looks at the clock
-  look();
+  if (looked_at_ < 0) look();
   look_at_shown();
   while (figures_.steps < figures_.steps_planned && figures_.lost.empty() && interrupt.signal() == 0) {
     std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
-    if (file_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
+    if (file_ || parts_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
     if (recorder_) end = std::min(end, (figures_.steps / frame_stride_ + 1) * frame_stride_);
     const Clock::time_point begin = Clock::now();
     batch_.step(end - figures_.steps);
@@ -85,10 +101,13 @@ void RolloutExecution<Real>::steps(const Interrupt& interrupt) {
     figures_.steps = end;
     if (taken > 0.4) stretch = std::max<std::int64_t>(1, stretch / 2);
     if (taken < 0.1) stretch = std::min(2 * stretch, figures_.steps_planned);
-    if (file_ && figures_.steps % arguments_.every == 0) look();
+    if ((file_ || parts_) && figures_.steps % arguments_.every == 0) look();
     if (recorder_ && figures_.steps % frame_stride_ == 0) look_at_shown();
+    if (checkpoints_ && checkpoints_->due(now)) keep();
     progress.update(figures_.steps, now);
   }
+  // before the last frame, which one that goes on from here does not have
+  if (checkpoints_) keep();
   if (looked_at_ != figures_.steps) look();
   if (recorder_ && figures_.steps % frame_stride_ != 0) look_at_shown();
   if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
@@ -99,15 +118,12 @@ void RolloutExecution<Real>::steps(const Interrupt& interrupt) {
 template <class Real>
 bool RolloutExecution<Real>::write_files() {
   bool fine = true;
-  if (file_) {
-    const std::string before = figures_.lost;
-    recording([&] {
-      file_->commit();
-      figures_.frames = file_->frames();
-    });
-    if (!before.empty()) figures_.lost = before;
-    fine = figures_.lost.empty();
-  }
+  recording([&] {
+    if (file_) file_->commit();
+    if (parts_) parts_->commit();
+  });
+  figures_.frames = file_ ? file_->frames() : parts_ ? parts_->parts().frames() : 0;
+  fine = figures_.lost.empty();
   if (recorder_) {
     WrittenViews views = write_views(arguments_.views, recorder_->animation());
     figures_.views = std::move(views.lines);
@@ -183,7 +199,7 @@ void RolloutExecution<Real>::recording(const std::function<void()>& work) {
   try {
     work();
   } catch (const std::runtime_error& error) {
-    figures_.lost = error.what();
+    if (figures_.lost.empty()) figures_.lost = error.what();
   }
 }
 
@@ -204,19 +220,61 @@ void RolloutExecution<Real>::look() {
     energy_[at] = static_cast<Real>(total);
     if (first) figures_.first_energy[at] = total;
     figures_.most_kinetic[at] = std::max(figures_.most_kinetic[at], kinetic);
-    if (!file_) continue;
+    if (!file_ && !parts_) continue;
     for (std::size_t k = 0; k < what_.size(); ++k) {
       const auto& from = what_[k] == Quantity::positions ? positions : what_[k] == Quantity::velocities ? velocities : energies;
       std::ranges::copy(from.instance(i), numbers_[k].begin() + i * from.rows());
     }
     status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
   }
-  if (file_ && figures_.lost.empty()) {
+  if ((file_ || parts_) && figures_.lost.empty()) {
     if (observations_) observe();
     const std::vector<std::span<const Real>> arrays(numbers_.begin(), numbers_.end());
-    recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, arrays, energy_, status_); });
+    const double time = static_cast<double>(figures_.steps) * arguments_.options.step;
+    recording([&] {
+      if (file_) file_->add(time, arrays, energy_, status_);
+      else parts_->add(time, arrays, energy_, status_);
+    });
   }
   looked_at_ = figures_.steps;
+}
+
+template <class Real>
+void RolloutExecution<Real>::keep() {
+  if (parts_) {
+    recording([&] { parts_->end_segment(); });
+    // what goes on from here makes up for the frame of this moment alone
+    const bool last_missing = figures_.steps % arguments_.every == 0;
+    if (parts_->parts().frames() < frames_due() - (last_missing ? 1 : 0)) return;
+  }
+  RolloutPart part;
+  part.steps = figures_.steps;
+  part.looked_at = looked_at_;
+  part.step_seconds = figures_.step_seconds;
+  part.first_energy = figures_.first_energy;
+  part.most_kinetic = figures_.most_kinetic;
+  part.last_energy.assign(energy_.begin(), energy_.end());
+  part.batch = batch_.checkpoint();
+  figures_.kept = checkpoints_->keep(part, parts_ ? parts_->parts() : RecordedParts());
+}
+
+template <class Real>
+void RolloutExecution<Real>::resume() {
+  const RolloutPart part = checkpoints_->part_of(share_of(arguments_.instances, ranks_.rank(), ranks_.count()));
+  if (part.steps > figures_.steps_planned) {
+    throw InputError(fmt::format("--resume {}: its checkpoint is after {}, the rollout is to end after {}; expected a --duration that is no "
+                                 "shorter",
+                                 arguments_.resume, counted(part.steps, "step"), grouped(figures_.steps_planned)));
+  }
+  batch_.restore(part.batch, arguments_.resume);
+  figures_.steps = part.steps;
+  figures_.step_seconds = part.step_seconds;
+  figures_.first_energy = part.first_energy;
+  figures_.most_kinetic = part.most_kinetic;
+  looked_at_ = part.looked_at;
+  std::ranges::transform(part.last_energy, energy_.begin(), [](double energy) { return static_cast<Real>(energy); });
+  tell("goes on after {} of {} steps, from {}", grouped(figures_.steps), grouped(figures_.steps_planned), arguments_.resume);
+  if (parts_ && parts_->frames() < frames_due()) look();  // the frame for which there was no room
 }
 
 template <class Real>

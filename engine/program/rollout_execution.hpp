@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "engine/batch.hpp"
+#include "engine/distributed/parted_recording.hpp"
 #include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/quantities.hpp"
 #include "engine/program/randomize.hpp"
+#include "engine/program/rollout_checkpoint.hpp"
 #include "engine/program/rollout_command.hpp"
 #include "engine/program/rollout_report.hpp"
 #include "engine/queries/observations.hpp"
@@ -25,7 +27,9 @@ namespace linden {
 template <class Real>
 class RolloutExecution {
  public:
-  RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps);
+  /// checkpoints: null where none are kept.
+  RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Ranks& ranks,
+                   RolloutCheckpoints* checkpoints);
 
   void steps(const Interrupt& interrupt);
 
@@ -44,10 +48,18 @@ class RolloutExecution {
   /// Of the first instance that runs.
   void account_of_one(const Interrupt& interrupt);
 
+  void begin_recording(const std::vector<FixedArray>& drawn);
   void recording(const std::function<void()>& work);
 
   /// Energies of all instances, and a frame of the file.
   void look();
+
+  /// What the instances are now goes into a checkpoint, and what was recorded of them is put in place.
+  void keep();
+  /// The instances are what they were in the checkpoint.
+  void resume();
+  /// Of the recording, after the steps that were taken.
+  std::int64_t frames_due() const { return figures_.steps / arguments_.every + 1; }
 
   void begin_views();
 
@@ -60,12 +72,15 @@ class RolloutExecution {
   void finish();
 
   const RolloutArguments& arguments_;
+  Ranks& ranks_;
+  RolloutCheckpoints* const checkpoints_;
   std::shared_ptr<const Model> model_;
   const Effects effects_;
   const std::optional<Observations> observations_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
   std::optional<RolloutFile<Real>> file_;
+  std::optional<PartedRecording<Real>> parts_;  // in its place where there are checkpoints
   std::vector<Quantity> what_;              // that is recorded
   std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
   std::vector<Real> energy_, observed_;

@@ -105,6 +105,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                                                                    : ", the energy of that instance is not accounted for"));
   }
   if (figures.frames > 0) row("", printable(fmt::format("{}: {}", arguments.record, counted(figures.frames, "frame"))));
+  if (!figures.checkpoint.empty()) row("checkpoint", printable(figures.checkpoint));
   for (const std::string& view : figures.views) row("", printable(view));
   if (figures.summary.frozen > 0) {
     row("frozen", fmt::format("{} at the last good state:", counted(figures.summary.frozen, "instance")));

@@ -33,6 +33,8 @@ struct RolloutFigures {
   int signal = 0;                                               // that ended the rollout
   std::int64_t frames = 0;                                      // recorded
   std::vector<std::string> views;                               // files that show the motion, and what each holds
+  bool kept = true;                                             // the checkpoint that was to be written last
+  std::string checkpoint;                                       // where there are some, and what the newest is
   std::string lost;                                             // why the recording ended early, and the rollout with it
 
   double steps_per_second() const { return static_cast<double>(summary.steps) / step_seconds; }
