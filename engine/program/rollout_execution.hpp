@@ -8,9 +8,12 @@
 #include <vector>
 
 #include "engine/batch.hpp"
+#include "engine/distributed/parted_recording.hpp"
+#include "engine/distributed/ranks.hpp"
 #include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
+#include "engine/program/progress.hpp"
 #include "engine/program/quantities.hpp"
 #include "engine/program/randomize.hpp"
 #include "engine/program/rollout_command.hpp"
@@ -25,7 +28,13 @@ namespace linden {
 template <class Real>
 class RolloutExecution {
  public:
-  RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps);
+  /// Of the rank's share of the instances.
+  RolloutExecution(Ranks& ranks, const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps);
+
+  // each by all ranks
+
+  /// The files that are written while it goes on.
+  void begin();
 
   void steps(const Interrupt& interrupt);
 
@@ -36,7 +45,8 @@ class RolloutExecution {
 
  private:
   /// What is drawn and how to step are the command line's; the start was looked at (look_at_start).
-  static Scene scene_of(const RolloutArguments& arguments, const Model& model);
+  static Scene scene_of(const RolloutArguments& arguments, const Model& model, std::int64_t first);
+  // i: among the instances of all ranks
   std::uint64_t seed_of(std::int64_t i) const { return randomness(arguments_)->seed + static_cast<std::uint64_t>(i); }
   InitialState start_of(std::int64_t i) const;
   DrawnNumbers drawn_of(std::int64_t i) const { return draw(arguments_.randomization, *model_, effects_, seed_of(i)); }
@@ -44,6 +54,12 @@ class RolloutExecution {
   /// Of the first instance that runs.
   void account_of_one(const Interrupt& interrupt);
 
+  /// All steps of a stretch.
+  void advance(std::int64_t end, Progress& progress);
+
+  /// What was asked for, but observations.
+  std::vector<RecordedArray> arrays_of_what();
+  bool records() const { return !arguments_.record.empty(); }
   void recording(const std::function<void()>& work);
 
   /// Energies of all instances, and a frame of the file.
@@ -57,15 +73,21 @@ class RolloutExecution {
   /// What was asked for beside what_, an array of each behind those.
   void observe();
 
-  void finish();
+  /// What is told of the instances of all ranks.
+  void gather_figures();
 
+  Ranks& ranks_;
+  const InstanceRange own_;
   const RolloutArguments& arguments_;
   std::shared_ptr<const Model> model_;
   const Effects effects_;
   const std::optional<Observations> observations_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
-  std::optional<RolloutFile<Real>> file_;
+  DrawnArrays drawn_;
+  std::vector<double> first_energy_, last_energy_, most_kinetic_;  // of each of the own instances [J]
+  std::optional<RolloutFile<Real>> file_;       // of one rank
+  std::optional<PartedRecording<Real>> parts_;  // of several
   std::vector<Quantity> what_;              // that is recorded
   std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
   std::vector<Real> energy_, observed_;
