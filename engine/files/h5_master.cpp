@@ -29,6 +29,8 @@ void H5Master::map(const Handle& creation, const Handle& space, const std::strin
   if (std::ranges::find(count, hsize_t{0}) != count.end()) return;
   out_.call(H5Sselect_hyperslab, space.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
   const Handle there = out_.space(count);
+  const std::vector<hsize_t> origin(count.size(), 0);  // from there on, also where the file has more frames
+  out_.call(H5Sselect_hyperslab, there.id(), H5S_SELECT_SET, origin.data(), nullptr, count.data(), nullptr);
   out_.call(H5Pset_virtual, creation.id(), space.id(), file.c_str(), name.c_str(), there.id());
 }
 

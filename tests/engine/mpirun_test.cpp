@@ -82,12 +82,12 @@ TEST_CASE("1, 2, 3 and 4 ranks record the bits of one process and report its fig
       CHECK(outcome.exit_code == 0);
       CHECK(messages(outcome).empty());
       CHECK(without_times(outcome.out) == without_times(alone.out));
-      CHECK_THAT(outcome.out, ranks > 1 ? Contains(fmt::format("processor   {} ranks, ", ranks)) : !Contains("ranks"));
+      CHECK((outcome.out.find(fmt::format("processor   {} ranks, ", ranks)) != outcome.out.npos) == (ranks > 1));
       CHECK(json_without_times(shell / "b.json") == json_without_times(shell / "a.json"));
       check_equal(read(shell.file("a.h5")), expected);
       CHECK(shell.visible().size() == (ranks == 1 ? 4 : 5));  // with the folder of parts, and none of those before
     }
-    fs::remove(shell / "a.h5");
+    shell.linden("rollout chain:1 --instances 1 --duration 0.001 --record a.h5");  // takes the place of all parts
   }
 }
 
@@ -143,7 +143,8 @@ TEST_CASE("a full disk at one rank ends all after the same step, with one messag
   const Shell shell;
   const Folder scripts;
   const Outcome outcome = shell.linden("rollout chain:3 --instances 40 --duration 100 --record a.h5 --json a.json",
-                                       mpirun_with(scripts, 3, "[ $rank = 1 ] && ulimit -f 400"));
+                                       // memory that Open MPI shares is a file too
+                                       "OMPI_MCA_btl=self,tcp " + mpirun_with(scripts, 3, "[ $rank = 1 ] && ulimit -f 2000"));
   CHECK(outcome.exit_code == 1);
   const std::vector<std::string> told = messages(outcome);
   INFO(outcome.err);
@@ -199,12 +200,11 @@ TEST_CASE("ranks that are killed while they write leave what was there before, a
     const Outcome outcome = disturbed(shell, 3, how);
     CHECK(outcome.exit_code != 0);
     check_equal(read(shell.file("a.h5")), before);
-    const std::string begun = "linden: .a.h5.linden.";
     const Outcome again = shell.linden("rollout chain:2 --instances 6 --duration 0.01 --record a.h5", mpirun(2));
     CHECK(again.exit_code == 0);
     const std::vector<std::string> told = messages(again);
     REQUIRE(told.size() == 1);
-    CHECK_THAT(told[0], StartsWith(begun) && Contains("removed; it was left by a process that was killed while it wrote a.h5"));
+    CHECK_THAT(told[0], Contains(".a.h5.linden.") && Contains(".part: removed; it was left by a process that was killed while it wrote a.h5"));
     check_equal(read(shell.file("a.h5")), before);
     CHECK(shell.visible().size() == 2);
   }
