@@ -86,7 +86,7 @@ void measure_master(int count, std::int64_t instances, std::int64_t frames) {
   }
   H5Master master(file, std::move(parts));
   declare<double>(master, instances, {recorded_positions(names), recorded_velocities(names)}, {});
-  master.commit();
+  master.commit([] {});
   const double taken = std::chrono::duration<double>(Clock::now() - begin).count();
   const auto bytes = static_cast<double>(std::filesystem::file_size(file));
   fmt::print("{:<66} {:.1f} ms, {:.1f} KiB: {:.0f} bytes of a part of an array\n", fmt::format("master of {} parts", count), 1e3 * taken,

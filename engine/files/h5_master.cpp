@@ -69,9 +69,9 @@ void H5Master::add_fixed(const std::string& name, std::vector<std::int64_t> shap
 
 void H5Master::add_words(const std::string& name, std::span<const std::string> words) { out_.add_words(name, words); }
 
-void H5Master::commit() {
+void H5Master::commit(const std::function<void()>& before) {
   out_.finish(last_);
-  out_.publish(parts_.empty() ? "" : fs::path(parts_.front().file).parent_path().string());
+  out_.publish(parts_.empty() ? "" : fs::path(parts_.front().file).parent_path().string(), before);
 }
 
 std::string parts_folder_of(const std::string& file) {

@@ -104,9 +104,7 @@ TEST_CASE("bad input is told once, with the exit code of one process", "[command
   const Shell shell;
   for (const auto& [arguments, expected] : std::map<std::string, std::string>{
            {"rollout no.urdf", "no.urdf"},
-           {"rollout chain:2 --instances x", "--instances"},
            {"rollout chain:2 --instance 5", "did you mean --instances?"},
-           {"rollout chain:2 --dt", "--dt"},
            {"rollout chain:2 --instances 2", "there are 3 ranks; expected an instance for each"},
            {"rollout chain:2 --record a.npz", "--record a.npz: 3 ranks write one recording in parts, which .h5 alone has; expected .h5"},
            {"rollout chain:2 --record no/a.h5", "there is no folder no; create it first"},
