@@ -1,7 +1,5 @@
 #include "engine/distributed/mpi_ranks.hpp"
 
-#define OMPI_SKIP_MPICXX 1  // the C++ interface that MPI once had
-#define MPICH_SKIP_MPICXX 1
 #include <mpi.h>
 #include <sched.h>
 
@@ -22,13 +20,14 @@ class MpiRanks final : public Ranks {
     MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided);  // threads of a rank compute and leave MPI alone
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &count_);
-    threads_ = own_threads();
+    look_at_machine();
   }
   ~MpiRanks() override { MPI_Finalize(); }
 
   int rank() const override { return rank_; }
   int count() const override { return count_; }
   int threads() const override { return threads_; }
+  int neighbours() const override { return neighbours_; }
   void barrier() override { MPI_Barrier(MPI_COMM_WORLD); }
   void sum(std::span<std::int64_t> numbers) override { reduce(numbers, MPI_INT64_T, MPI_SUM); }
   void least(std::span<std::int64_t> numbers) override { reduce(numbers, MPI_INT64_T, MPI_MIN); }
@@ -79,20 +78,19 @@ class MpiRanks final : public Ranks {
   }
 
   /// mpirun may give a rank cores of its own, or some to share, or all.
-  static int own_threads() {
+  void look_at_machine() {
     cpu_set_t own, all;
     CPU_ZERO(&own);
     sched_getaffinity(0, sizeof own, &own);
     MPI_Comm machine;
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine);
-    int ranks = 1;
-    MPI_Comm_size(machine, &ranks);
+    MPI_Comm_size(machine, &neighbours_);
     MPI_Allreduce(&own, &all, static_cast<int>(sizeof own), MPI_BYTE, MPI_BOR, machine);
     MPI_Comm_free(&machine);
-    return std::max(1, std::min(cores_of(own), cores_of(all) / ranks));
+    threads_ = std::max(1, std::min(cores_of(own), cores_of(all) / neighbours_));
   }
 
-  int rank_ = 0, count_ = 1, threads_ = 1;
+  int rank_ = 0, count_ = 1, threads_ = 1, neighbours_ = 1;
   MPI_Request request_ = MPI_REQUEST_NULL;
   std::vector<std::int64_t> begun_, reduced_;
 };

@@ -126,10 +126,9 @@ void PartedRecording<Real>::put_in_place() {
 template <class Real>
 void PartedRecording<Real>::write_master() {
   room_.reset();
-  folder_.keep();
   H5Master master(file_, parts_of_master());
   declare<Real>(master, instances_, arrays_, fixed_);
-  master.commit();
+  master.commit([&] { folder_.keep(); });
 }
 
 template <class Real>

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <initializer_list>
@@ -22,6 +23,7 @@ class Alone final : public Ranks {
   int rank() const override { return 0; }
   int count() const override { return 1; }
   int threads() const override { return threads_here(); }
+  int neighbours() const override { return 1; }
   void barrier() override {}
   void sum(std::span<std::int64_t>) override {}
   void least(std::span<std::int64_t>) override {}
@@ -55,13 +57,15 @@ std::string host() {
 
 std::unique_ptr<Ranks> alone() { return std::make_unique<Alone>(); }
 
+int told_rank() { return std::max(0, number_in_environment({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"})); }
+
 std::unique_ptr<Ranks> ranks_of_program() {
   // as Open MPI, MPICH and its kin, and Slurm tell those they start
   const int rank = number_in_environment({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"});
   const int told = number_in_environment({"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"});
   std::unique_ptr<Ranks> ranks = rank >= 0 && has_mpi() ? mpi_ranks() : alone();
   if (told <= 1 || ranks->count() == told) return ranks;
-  if (number_in_environment({"OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID"}) > 0) throw ToldElsewhere{2};
+  if (told_rank() > 0) throw ToldElsewhere{2};
   throw InputError(fmt::format(
       "this is one of {} processes that were started together, and {}; expected all of them, or each would do the same; {}", told,
       has_mpi() ? fmt::format("its MPI ({}) finds {}", mpi_library(), ranks->count()) : "linden was built without MPI",
@@ -86,23 +90,23 @@ void together(Ranks& ranks, const std::function<void()>& work) {
   if (!ranks.several()) return work();
   std::exception_ptr failure;
   std::string message;
-  std::int64_t failed = 0, first = ranks.count();
+  std::int64_t first = ranks.count();
   int exit_code = 0;
   try {
     work();
   } catch (const std::exception& error) {
     failure = std::current_exception();
     message = error.what();
-    failed = 1, first = ranks.rank(), exit_code = exit_code_of(error);
+    first = ranks.rank(), exit_code = exit_code_of(error);
   }
   constexpr std::int64_t kCodes = 256;
   std::int64_t told = first * kCodes + exit_code;
   ranks.least({&told, 1});
   if (told == ranks.count() * kCodes) return;
-  ranks.sum({&failed, 1});
+  ranks.ending_ = true;
   exit_code = static_cast<int>(told % kCodes);
   if (told / kCodes != ranks.rank()) throw ToldElsewhere{exit_code};
-  if (failed == ranks.count()) std::rethrow_exception(failure);
+  if (ranks.first()) std::rethrow_exception(failure);
   message = fmt::format("rank {} of {} on {}: {}", ranks.rank(), ranks.count(), host(), message);
   if (exit_code == 2) throw InputError(message);
   throw std::runtime_error(message);

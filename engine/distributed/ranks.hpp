@@ -36,6 +36,8 @@ class Ranks {
   virtual int count() const = 0;
   /// Threads that this rank may use so that all ranks of its machine together use the cores that they have, each once.
   virtual int threads() const = 0;
+  /// Ranks of this machine, this one included.
+  virtual int neighbours() const = 0;
   bool first() const { return rank() == 0; }
   bool several() const { return count() > 1; }
 
@@ -58,10 +60,18 @@ class Ranks {
 
   /// Ends all ranks at once, where one failed that the others do not know of.
   [[noreturn]] virtual void abort(int exit_code) = 0;
+  /// Whether what was thrown last is known to all.
+  bool ending() const { return ending_; }
+
+ private:
+  friend void together(Ranks& ranks, const std::function<void()>& work);
+  bool ending_ = false;
 };
 
 /// One that is the only one.
 std::unique_ptr<Ranks> alone();
+/// The number of this process among those that mpirun started, by what that says before any of them knows of the others; 0 where it is alone.
+int told_rank();
 /// Those that mpirun started, or one alone where it did not. Throws InputError where this process was started as one of several and does
 /// not find the others: they would all do and write the same.
 std::unique_ptr<Ranks> ranks_of_program();
@@ -77,8 +87,8 @@ std::string first_text(Ranks& ranks, const std::string& own);
 /// Exit code of an error (engine/program/main.cpp): 2 for bad input, else 1.
 int exit_code_of(const std::exception& error);
 
-/// Does `work` at every rank. Where it throws a std::exception at some, the first of them throws that (its message says which rank it was
-/// if there are others that did not fail), and all others throw ToldElsewhere with the same exit code.
+/// Does `work` at every rank. Where it throws a std::exception at some, the first of them throws that (its message says which rank
+/// it was, but for rank 0), and all others throw ToldElsewhere with the same exit code.
 void together(Ranks& ranks, const std::function<void()>& work);
 
 }  // namespace linden

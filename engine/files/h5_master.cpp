@@ -29,6 +29,8 @@ void H5Master::map(const Handle& creation, const Handle& space, const std::strin
   if (std::ranges::find(count, hsize_t{0}) != count.end()) return;
   out_.call(H5Sselect_hyperslab, space.id(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
   const Handle there = out_.space(count);
+  const std::vector<hsize_t> origin(count.size(), 0);  // from there on, also where the file has more frames
+  out_.call(H5Sselect_hyperslab, there.id(), H5S_SELECT_SET, origin.data(), nullptr, count.data(), nullptr);
   out_.call(H5Pset_virtual, creation.id(), space.id(), file.c_str(), name.c_str(), there.id());
 }
 
@@ -67,9 +69,9 @@ void H5Master::add_fixed(const std::string& name, std::vector<std::int64_t> shap
 
 void H5Master::add_words(const std::string& name, std::span<const std::string> words) { out_.add_words(name, words); }
 
-void H5Master::commit() {
+void H5Master::commit(const std::function<void()>& before) {
   out_.finish(last_);
-  out_.publish(parts_.empty() ? "" : fs::path(parts_.front().file).parent_path().string());
+  out_.publish(parts_.empty() ? "" : fs::path(parts_.front().file).parent_path().string(), before);
 }
 
 std::string parts_folder_of(const std::string& file) {

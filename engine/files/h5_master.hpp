@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,8 @@ class H5Master final : public ArrayLayout {
   /// The numbers are in the parts; none are read here.
   void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) override;
   void add_words(const std::string& name, std::span<const std::string> words) override;
-  void commit();
+  /// Puts it in place, where `before` has given the parts the names that it refers to.
+  void commit(const std::function<void()>& before);
 
  private:
   /// Of an array [sizes]: gives it the fill value and its places in a part, from `start` on.

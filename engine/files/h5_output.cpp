@@ -61,11 +61,12 @@ void H5Output::describe(hid_t dataset, std::span<const std::string> names, const
   write("names", space({&count, 1}), words);
 }
 
-void H5Output::publish(const std::string& own_parts) {
+void H5Output::publish(const std::string& own_parts, const std::function<void()>& before) {
   finish(file_);
   disk_.close();
   require(true);
   const std::string replaced = parts_folder_of(target());
+  before();
   folder_.publish(kWhole);
   if (replaced != own_parts) remove_parts(target(), replaced);
 }

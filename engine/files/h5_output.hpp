@@ -5,6 +5,7 @@
 
 #include <hdf5.h>
 
+#include <functional>
 #include <span>
 #include <string>
 #include <utility>
@@ -43,8 +44,8 @@ class H5Output {
   /// As attributes of a dataset, names where they are not too many.
   void describe(hid_t dataset, std::span<const std::string> names, const std::string& units) const;
   /// Closes the file, after all of its datasets, and puts it in place. What was there before goes, and its parts with it (h5_master.hpp)
-  /// unless they are in the folder `own_parts`.
-  void publish(const std::string& own_parts = "");
+  /// unless they are in the folder `own_parts`. `before` is called when all but that is done.
+  void publish(const std::string& own_parts = "", const std::function<void()>& before = [] {});
 
   /// HDF5's functions that return an error ...
   template <class Function, class... Arguments>

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/distributed/ranks.hpp"
 #include "engine/program/accuracy_command.hpp"
 #include "engine/program/inspect.hpp"
 #include "engine/program/option_texts.hpp"
@@ -296,6 +297,26 @@ void refuse_leftovers(const CLI::App& app, const std::string& command) {
                                              : fmt::format("did you mean {}?", guess)));
 }
 
+int report_error(std::string_view message, int exit_code) {
+  speak(true);
+  tell_text(message);
+  return exit_code;
+}
+
+/// A command that all ranks work on; the first of them speaks for all.
+int by_ranks(const std::function<int(Ranks& ranks)>& command) {
+  const std::unique_ptr<Ranks> ranks = ranks_of_program();
+  speak(ranks->first());
+  try {
+    return command(*ranks);
+  } catch (const std::exception& error) {
+    if (!ranks->several() || ranks->ending()) throw;
+    const int exit_code = report_error(error.what(), exit_code_of(error));
+    ranks->abort(exit_code);
+    return exit_code;
+  }
+}
+
 int run_program(int argc, char** argv) {
   CLI::App program("Simulates trees of rigid bodies with a variational integrator, in time linear in their number.", "linden");
   program.set_version_flag("--version", fmt::format("linden {}", kVersion));
@@ -332,6 +353,7 @@ int run_program(int argc, char** argv) {
     say_text(with_single_gaps(program.help()));
     return 0;
   } catch (const CLI::ParseError& error) {
+    if (rollout->parsed() && told_rank() > 0) throw ToldElsewhere{2};
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
     std::string help = "linden";
     for (const CLI::App* command : {run, rollout, view, accuracy, scaling, inspection}) {
@@ -348,11 +370,15 @@ int run_program(int argc, char** argv) {
     return run_command(run_arguments);
   }
   if (rollout->parsed()) {
-    refuse_leftovers(*rollout, "linden rollout");
-    read_rollout_options(texts, rollout_arguments);
-    const std::span<const char* const> words(argv, static_cast<std::size_t>(argc));
-    rollout_arguments.command_to_resume = command_to_resume(words, rollout_arguments.checkpoint);
-    return rollout_command(rollout_arguments);
+    return by_ranks([&](Ranks& ranks) {
+      together(ranks, [&] {
+        refuse_leftovers(*rollout, "linden rollout");
+        read_rollout_options(texts, rollout_arguments);
+        const std::span<const char* const> words(argv, static_cast<std::size_t>(argc));
+        rollout_arguments.command_to_resume = command_to_resume(words, rollout_arguments.checkpoint);
+      });
+      return rollout_command(ranks, rollout_arguments);
+    });
   }
   if (view->parsed()) {
     refuse_leftovers(*view, "linden view");
@@ -379,14 +405,11 @@ int run_program(int argc, char** argv) {
 
 constexpr const char* kNoMemory = "there is not enough memory for that; choose a smaller model or fewer instances, or allow more (ulimit -v)";
 
-int report_error(std::string_view message, int exit_code) {
-  tell_text(message);
-  return exit_code;
-}
-
 int guarded(int argc, char** argv) {
   try {
     return run_program(argc, argv);
+  } catch (const ToldElsewhere& elsewhere) {
+    return elsewhere.exit_code;
   } catch (const MemoryError& error) {
     return report_error(error.what(), 1);
   } catch (const InputError& error) {

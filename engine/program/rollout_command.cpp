@@ -62,31 +62,51 @@ Outputs checked_outputs(const RolloutArguments& arguments) {
   return Outputs(files);
 }
 
+/// What several ranks cannot do.
+void check_shared(const Ranks& ranks, const RolloutArguments& arguments) {
+  if (!ranks.several()) return;
+  if (!arguments.record.empty() && !arguments.record.ends_with(".h5")) {
+    throw InputError(fmt::format("--record {}: {} ranks write one recording in parts, which .h5 alone has; expected .h5", arguments.record,
+                                 ranks.count()));
+  }
+  if (arguments.instances < ranks.count()) {
+    throw InputError(fmt::format("--instances {}: there are {} ranks; expected an instance for each, or more; start fewer ranks",
+                                 arguments.instances, ranks.count()));
+  }
+  if (const std::int64_t here = share_of(arguments.instances, 0, ranks.count()).count; arguments.views.any() && arguments.shown > here) {
+    throw InputError(fmt::format("--shown {}: rank 0 shows those of its own instances, which are {}; expected no more", arguments.shown, here));
+  }
+}
+
 /// Refuses more instances than this machine's memory holds, with what is computed of all of them at once. observed: numbers of each.
 template <class Real>
-void check_instances(const RolloutArguments& arguments, const Shape& shape, double observed) {
+void check_instances(const Ranks& ranks, const RolloutArguments& arguments, const Shape& shape, double observed) {
   const double nq = shape.positions, nv = shape.velocities;
   double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
   if (!arguments.record.empty()) numbers += nq + nv + 2 * observed;
   if (!arguments.checkpoint.empty()) numbers += 3 * (nq + 3 * nv + 2);  // the bytes of a checkpoint, and parts of them
   if (arguments.randomization.masses) numbers += (arguments.record.empty() ? 11.0 : 13.0) * shape.slots;
   const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
-  require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
-                 static_cast<double>(arguments.instances) * each);
+  const std::int64_t here = share_of(arguments.instances, ranks.rank(), ranks.count()).count * ranks.neighbours();
+  require_memory(fmt::format("{} instances of {}", grouped(here), arguments.model), static_cast<double>(here) * each);
 }
 
 template <class Real>
-int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin,
-            Ranks& ranks, RolloutCheckpoints* checkpoints) {
-  const std::optional<Observations> observations = observations_of(*model, arguments.effects(), arguments.observe);
-  check_instances<Real>(arguments, model->tree.shape, observations ? static_cast<double>(observations->width()) : 0);
+int execute(Ranks& ranks, const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin,
+            RolloutCheckpoints* checkpoints) {
   const Interrupt interrupt;
-  RolloutExecution<Real> rollout(arguments, model, steps, ranks, checkpoints);
-  rollout.steps(interrupt);
-  RolloutFigures& figures = rollout.figures();
+  std::optional<RolloutExecution<Real>> rollout;
+  together(ranks, [&] {
+    const std::optional<Observations> observations = observations_of(*model, arguments.effects(), arguments.observe);
+    check_instances<Real>(ranks, arguments, model->tree.shape, observations ? static_cast<double>(observations->width()) : 0);
+    rollout.emplace(ranks, arguments, model, steps, checkpoints);
+  });
+  together(ranks, [&] { rollout->begin(); });
+  rollout->steps(interrupt);
+  RolloutFigures& figures = rollout->figures();
   if (checkpoints) figures.checkpoint = checkpoints->text();
   figures.total_seconds = seconds(Clock::now() - begin);
-  const bool written = rollout.write_files();
+  const bool written = rollout->write_files();
   say_text(rollout_summary(arguments, *model, figures));
   const std::string to_go_on = checkpoints && !checkpoints->command().empty() ? "; to go on: " + checkpoints->command() : "";
   if (figures.signal != 0) {
@@ -111,29 +131,52 @@ int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> mode
   return written && figures.kept && figures.summary.frozen == 0 ? 0 : 1;
 }
 
+/// Cores that the ranks of a machine share, and instructions that all have.
+void share_processor(Ranks& ranks, RolloutArguments& arguments) {
+  BatchOptions& computed = arguments.computed;
+  if (computed.threads == 0) computed.threads = ranks.threads();
+  const auto best = static_cast<std::int64_t>(best_instructions());
+  std::int64_t least = best, most = best;
+  ranks.least({&least, 1});
+  ranks.most({&most, 1});
+  if (computed.instructions) return;
+  computed.instructions = static_cast<Instructions>(least);
+  arguments.instructions_shared = least != most;
+}
+
 }  // namespace
 
-int rollout_command(const RolloutArguments& given) {
+int rollout_command(Ranks& ranks, RolloutArguments arguments) {
   const Clock::time_point begin = Clock::now();
-  RolloutArguments arguments = given;
-  check(arguments.options);
-  const std::int64_t steps = step_count(arguments, arguments.options.step);
-  const Outputs outputs = checked_outputs(arguments);
-  if (arguments.options.order != 2) {
-    throw InputError(fmt::format("--order {}: a rollout has order 2 alone; expected 2; give --order 2, or simulate one instance with linden run",
-                                 arguments.options.order));
-  }
+  std::int64_t steps = 0;
+  std::shared_ptr<const Model> model;
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
-  const std::shared_ptr<const Model> model = arguments.loaded(outputs);
-  print_warnings(*model);
-  check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
-  look_at_start(arguments, *model, arguments.options);
+  together(ranks, [&] {
+    check(arguments.options);
+    steps = step_count(arguments, arguments.options.step);
+    // one looks at the files that are written
+    const Outputs outputs = ranks.first() ? checked_outputs(arguments) : Outputs({});
+    if (arguments.options.order != 2) {
+      throw InputError(fmt::format("--order {}: a rollout has order 2 alone; expected 2; give --order 2, or simulate one instance with linden run",
+                                   arguments.options.order));
+    }
+    check_shared(ranks, arguments);
+    model = arguments.loaded(outputs);
+    print_warnings(*model);
+    if (ranks.first()) check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
+    look_at_start(arguments, *model, arguments.options);
+  });
+  // one that goes on has the instructions that it began with, one that begins those that all ranks have
   std::optional<RolloutCheckpoints> kept;
-  const std::unique_ptr<Ranks> ranks = alone();
-  if (!arguments.checkpoint.empty()) kept.emplace(arguments, *model, *ranks);
+  if (!arguments.resume.empty()) kept.emplace(arguments, *model, ranks);
+  if (ranks.several()) share_processor(ranks, arguments);
+  if (!arguments.checkpoint.empty() && !kept) kept.emplace(arguments, *model, ranks);
   RolloutCheckpoints* const checkpoints = kept ? &*kept : nullptr;
-  return arguments.single ? execute<float>(arguments, model, steps, begin, *ranks, checkpoints)
-                          : execute<double>(arguments, model, steps, begin, *ranks, checkpoints);
+  const int own = arguments.single ? execute<float>(ranks, arguments, model, steps, begin, checkpoints)
+                                   : execute<double>(ranks, arguments, model, steps, begin, checkpoints);
+  std::int64_t exit_code = own;
+  ranks.most({&exit_code, 1});
+  return static_cast<int>(exit_code);
 }
 
 }  // namespace linden

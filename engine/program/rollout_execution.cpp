@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <stdexcept>
 
+#include "engine/distributed/stretches.hpp"
 #include "engine/files/report_files.hpp"
 #include "engine/program/effects_text.hpp"
-#include "engine/program/progress.hpp"
+#include "engine/program/energy_change.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
 #include "engine/standard_streams.hpp"
@@ -26,123 +28,161 @@ using Clock = Progress::Clock;
 }  // namespace
 
 template <class Real>
-RolloutExecution<Real>::RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Ranks& ranks,
-                                         RolloutCheckpoints* checkpoints)
-    : arguments_(arguments),
-      ranks_(ranks),
+RolloutExecution<Real>::RolloutExecution(Ranks& ranks, const RolloutArguments& arguments, std::shared_ptr<const Model> model,
+                                         std::int64_t steps, RolloutCheckpoints* checkpoints)
+    : ranks_(ranks),
+      own_(share_of(arguments.instances, ranks.rank(), ranks.count())),
+      arguments_(arguments),
       checkpoints_(checkpoints),
       model_(std::move(model)),
       effects_(arguments.effects()),
       observations_(observations_of(*model_, effects_, arguments.observe)),
-      batch_(scene_of(arguments, *model_), arguments.instances, arguments.computed) {
+      batch_(scene_of(arguments, *model_, own_.first), own_.count, arguments.computed),
+      drawn_(records() ? arguments.randomization : Randomization(), *model_, effects_, own_.count) {
   figures_.steps_planned = steps;
-  figures_.lanes = batch_.lanes();
-  figures_.threads = batch_.threads();
-  DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, *model_, effects_, arguments.instances);
   batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
-    const InitialState state = start_of(i);
+    const InitialState state = start_of(own_.first + i);
     std::ranges::copy(state.positions, positions.begin());
     std::ranges::copy(state.velocities, velocities.begin());
-    if (!drawn.arrays().empty()) drawn.set(i, drawn_of(i));
+    if (!drawn_.arrays().empty()) drawn_.set(i, drawn_of(own_.first + i));
   });
-  look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
-    const auto rows = batch_.positions().instance(i);
-    return std::vector<double>(rows.begin(), rows.end());
-  });
-  figures_.bytes = batch_.bytes();
-  energy_.resize(static_cast<std::size_t>(arguments.instances));
-  if (!arguments.record.empty()) begin_recording(drawn.arrays());
-  if (checkpoints && checkpoints->resumed()) resume();
-  if (arguments.views.any()) begin_views();
+  if (records() && observations_) {
+    observed_.resize(static_cast<std::size_t>(own_.count * observations_->width()));
+    observe();  // refuses accelerations where there are none
+  }
+  status_.resize(static_cast<std::size_t>(own_.count));
+  energy_.resize(static_cast<std::size_t>(own_.count));
 }
 
 template <class Real>
-void RolloutExecution<Real>::begin_recording(const std::vector<FixedArray>& drawn) {
+void RolloutExecution<Real>::begin() {
+  look_at_instances(arguments_, arguments_.options, arguments_.instances, ranks_, own_, [&](std::int64_t i) {
+    const auto rows = batch_.positions().instance(i);
+    return std::vector<double>(rows.begin(), rows.end());
+  });
+  if (records()) {
+    std::vector<RecordedArray> arrays = arrays_of_what();
+    if (observations_) {
+      for (RecordedArray& array : recorded_observations(*observations_)) arrays.push_back(std::move(array));
+    }
+    const int packers = arguments_.compress ? batch_.threads() : 0;
+    if (checkpoints_ && !checkpoints_->recorded().segments.empty()) {
+      parts_.emplace(ranks_, arguments_.record, arguments_.instances, std::move(arrays), drawn_.arrays(), checkpoints_->recorded(), packers);
+    } else if (checkpoints_ || ranks_.several()) {
+      parts_.emplace(ranks_, arguments_.record, arguments_.instances, std::move(arrays), drawn_.arrays(), packers);
+    } else {
+      file_.emplace(arguments_.record, own_.count, std::move(arrays), drawn_.arrays(), packers);
+    }
+  }
+  if (checkpoints_ && checkpoints_->resumed()) resume();
+  if (arguments_.views.any() && ranks_.first()) begin_views();
+}
+
+template <class Real>
+std::vector<RecordedArray> RolloutExecution<Real>::arrays_of_what() {
   what_ = arguments_.what.empty() ? usual_quantities(arguments_.record) : arguments_.what;
   const Names& names = batch_.model().names;
   std::vector<RecordedArray> arrays;
+  numbers_.clear();
   for (const Quantity quantity : what_) {
     arrays.push_back(quantity == Quantity::positions    ? recorded_positions(names)
                      : quantity == Quantity::velocities ? recorded_velocities(names)
                                                         : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
-    numbers_.emplace_back(static_cast<std::size_t>(arguments_.instances) * arrays.back().rows.size());
+    numbers_.emplace_back(static_cast<std::size_t>(own_.count) * arrays.back().rows.size());
   }
-  if (observations_) {
-    for (RecordedArray& array : recorded_observations(*observations_)) arrays.push_back(std::move(array));
-    observed_.resize(static_cast<std::size_t>(arguments_.instances * observations_->width()));
-    observe();  // refuses accelerations where there are none
-  }
-  status_.resize(static_cast<std::size_t>(arguments_.instances));
-  const int packers = arguments_.compress ? batch_.threads() : 0;
-  if (!checkpoints_) {
-    file_.emplace(arguments_.record, arguments_.instances, std::move(arrays), drawn, packers);
-  } else if (checkpoints_->recorded().segments.empty()) {
-    parts_.emplace(ranks_, arguments_.record, arguments_.instances, std::move(arrays), drawn, packers);
-  } else {
-    parts_.emplace(ranks_, arguments_.record, arguments_.instances, std::move(arrays), drawn, checkpoints_->recorded(), packers);
-  }
+  return arrays;
 }
 
 template <class Real>
 void RolloutExecution<Real>::steps(const Interrupt& interrupt) {
   Progress progress(figures_.steps_planned, arguments_.options.step);
-  std::int64_t stretch = 1;  // steps between two looks at the clock
-  if (looked_at_ < 0) look();
-  look_at_shown();
-  while (figures_.steps < figures_.steps_planned && figures_.lost.empty() && interrupt.signal() == 0) {
-    std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
-    if (file_ || parts_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
-    if (recorder_) end = std::min(end, (figures_.steps / frame_stride_ + 1) * frame_stride_);
-    const Clock::time_point begin = Clock::now();
-    batch_.step(end - figures_.steps);
+  Stretches stretches(ranks_, figures_.steps_planned, figures_.steps);
+  std::exception_ptr failure;  // the others are told of it before it is thrown
+  const auto attempting = [&](const auto& work) {
+    try {
+      if (!failure) work();
+    } catch (const std::exception&) {
+      failure = std::current_exception();
+    }
+  };
+  attempting([&] {
+    if (looked_at_ < 0) look();
+    look_at_shown();
+  });
+  Clock::time_point begin = Clock::now();
+  bool more = true;
+  while (more) {
+    attempting([&] { advance(stretches.end(), progress); });
     const Clock::time_point now = Clock::now();
-    const double taken = seconds(now - begin);
-    figures_.step_seconds += taken;
-    figures_.steps = end;
-    if (taken > 0.4) stretch = std::max<std::int64_t>(1, stretch / 2);
-    if (taken < 0.1) stretch = std::min(2 * stretch, figures_.steps_planned);
-    if ((file_ || parts_) && figures_.steps % arguments_.every == 0) look();
-    if (recorder_ && figures_.steps % frame_stride_ == 0) look_at_shown();
-    if (checkpoints_ && checkpoints_->due(now)) keep();
-    progress.update(figures_.steps, now);
+    more = stretches.next(seconds(now - begin), interrupt.signal(), failure || !figures_.lost.empty(), checkpoints_ && checkpoints_->due(now));
+    if (more && stretches.due()) keep(failure != nullptr);
+    begin = now;
   }
   // before the last frame, which one that goes on from here does not have
-  if (checkpoints_) keep();
-  if (looked_at_ != figures_.steps) look();
-  if (recorder_ && figures_.steps % frame_stride_ != 0) look_at_shown();
-  if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
-  finish();
+  if (checkpoints_) keep(failure != nullptr);
+  attempting([&] {
+    if (looked_at_ != figures_.steps) look();
+    if (recorder_ && figures_.steps % frame_stride_ != 0) look_at_shown();
+  });
+  together(ranks_, [&] {
+    if (failure) std::rethrow_exception(failure);
+  });
+  figures_.lost = first_text(ranks_, figures_.lost);
+  if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = stretches.signal();
+  gather_figures();
   if (figures_.signal == 0 && figures_.lost.empty()) account_of_one(interrupt);
+}
+
+template <class Real>
+void RolloutExecution<Real>::advance(std::int64_t end, Progress& progress) {
+  // where the recording is lost, one alone ends there, and of several all after the same step
+  while (figures_.steps < end && (figures_.lost.empty() || ranks_.several())) {
+    std::int64_t next = end;
+    if (records()) next = std::min(next, (figures_.steps / arguments_.every + 1) * arguments_.every);
+    if (recorder_) next = std::min(next, (figures_.steps / frame_stride_ + 1) * frame_stride_);
+    const Clock::time_point begin = Clock::now();
+    batch_.step(next - figures_.steps);
+    const Clock::time_point now = Clock::now();
+    figures_.step_seconds += seconds(now - begin);
+    figures_.steps = next;
+    if (records() && figures_.steps % arguments_.every == 0) look();
+    if (recorder_ && figures_.steps % frame_stride_ == 0) look_at_shown();
+    progress.update(figures_.steps, now);
+  }
 }
 
 template <class Real>
 bool RolloutExecution<Real>::write_files() {
   bool fine = true;
-  recording([&] {
-    if (file_) file_->commit();
-    if (parts_) parts_->commit();
-  });
-  figures_.frames = file_ ? file_->frames() : parts_ ? parts_->parts().frames() : 0;
-  fine = figures_.lost.empty();
+  if (records()) {
+    const std::string before = figures_.lost;
+    recording([&] {
+      if (parts_) parts_->commit();
+      else file_->commit();
+    });
+    figures_.frames = parts_ ? parts_->frames() : file_->frames();
+    if (!before.empty()) figures_.lost = before;
+    fine = figures_.lost.empty();
+  }
   if (recorder_) {
     WrittenViews views = write_views(arguments_.views, recorder_->animation());
     figures_.views = std::move(views.lines);
     fine = fine && views.fine;
   }
-  if (!arguments_.json.empty()) {
+  if (!arguments_.json.empty() && ranks_.first()) {
     fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
   }
   return fine;
 }
 
 template <class Real>
-Scene RolloutExecution<Real>::scene_of(const RolloutArguments& arguments, const Model& model) {
+Scene RolloutExecution<Real>::scene_of(const RolloutArguments& arguments, const Model& model, std::int64_t first) {
   Scene scene;
   if (arguments.scene) scene = *arguments.scene;
   else scene.model = model;
   scene.options = arguments.options;
   scene.randomization = arguments.randomization;
-  scene.seed = randomness(arguments)->seed;
+  scene.seed = randomness(arguments)->seed + static_cast<std::uint64_t>(first);
   scene.start_as_given = true;
   return scene;
 }
@@ -159,8 +199,12 @@ void RolloutExecution<Real>::account_of_one(const Interrupt& interrupt) {
   constexpr std::int64_t kMostAccounted = 10'000, kSamples = 2'000;
   if (effect_lines(effects_, *model_).empty()) return;
   AccountOfOne one;
-  while (one.instance < arguments_.instances && batch_.record(one.instance).status != StepStatus::converged) ++one.instance;
-  if (one.instance == arguments_.instances) return;
+  one.instance = arguments_.instances;
+  for (std::int64_t i = own_.count; i-- > 0;) {
+    if (batch_.record(i).status == StepStatus::converged) one.instance = own_.first + i;
+  }
+  ranks_.least({&one.instance, 1});
+  if (one.instance == arguments_.instances || !ranks_.first()) return;
   std::shared_ptr<const Model> model = model_;
   Effects effects = effects_;
   if (arguments_.randomization.any()) {
@@ -210,37 +254,40 @@ void RolloutExecution<Real>::look() {
   const auto positions = batch_.positions();
   const bool first = looked_at_ < 0;
   if (first) {
-    figures_.first_energy.resize(energy_.size());
-    figures_.most_kinetic.resize(energy_.size());
+    first_energy_.resize(energy_.size());
+    most_kinetic_.resize(energy_.size());
   }
-  for (std::int64_t i = 0; i < arguments_.instances; ++i) {
+  for (std::int64_t i = 0; i < own_.count; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const auto kinetic = static_cast<double>(energies(i, 0));
     const double total = kinetic + static_cast<double>(energies(i, 1));
     energy_[at] = static_cast<Real>(total);
-    if (first) figures_.first_energy[at] = total;
-    figures_.most_kinetic[at] = std::max(figures_.most_kinetic[at], kinetic);
-    if (!file_ && !parts_) continue;
+    if (first) first_energy_[at] = total;
+    most_kinetic_[at] = std::max(most_kinetic_[at], kinetic);
+    if (!records()) continue;
     for (std::size_t k = 0; k < what_.size(); ++k) {
       const auto& from = what_[k] == Quantity::positions ? positions : what_[k] == Quantity::velocities ? velocities : energies;
       std::ranges::copy(from.instance(i), numbers_[k].begin() + i * from.rows());
     }
     status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
   }
-  if ((file_ || parts_) && figures_.lost.empty()) {
+  if (records() && figures_.lost.empty()) {
     if (observations_) observe();
     const std::vector<std::span<const Real>> arrays(numbers_.begin(), numbers_.end());
     const double time = static_cast<double>(figures_.steps) * arguments_.options.step;
     recording([&] {
-      if (file_) file_->add(time, arrays, energy_, status_);
-      else parts_->add(time, arrays, energy_, status_);
+      if (parts_) parts_->add(time, arrays, energy_, status_);
+      else file_->add(time, arrays, energy_, status_);
     });
   }
   looked_at_ = figures_.steps;
 }
 
 template <class Real>
-void RolloutExecution<Real>::keep() {
+void RolloutExecution<Real>::keep(bool failed) {
+  std::int64_t any = failed ? 1 : 0;
+  ranks_.most({&any, 1});
+  if (any != 0) return;
   if (parts_) {
     recording([&] { parts_->end_segment(); });
     // what goes on from here makes up for the frame of this moment alone
@@ -248,11 +295,12 @@ void RolloutExecution<Real>::keep() {
     if (parts_->parts().frames() < frames_due() - (last_missing ? 1 : 0)) return;
   }
   RolloutPart part;
+  part.first = own_.first;
   part.steps = figures_.steps;
   part.looked_at = looked_at_;
   part.step_seconds = figures_.step_seconds;
-  part.first_energy = figures_.first_energy;
-  part.most_kinetic = figures_.most_kinetic;
+  part.first_energy = first_energy_;
+  part.most_kinetic = most_kinetic_;
   part.last_energy.assign(energy_.begin(), energy_.end());
   part.batch = batch_.checkpoint();
   figures_.kept = checkpoints_->keep(part, parts_ ? parts_->parts() : RecordedParts());
@@ -260,7 +308,7 @@ void RolloutExecution<Real>::keep() {
 
 template <class Real>
 void RolloutExecution<Real>::resume() {
-  const RolloutPart part = checkpoints_->part_of(share_of(arguments_.instances, ranks_.rank(), ranks_.count()));
+  const RolloutPart part = checkpoints_->part_of(own_);
   if (part.steps > figures_.steps_planned) {
     throw InputError(fmt::format("--resume {}: its checkpoint is after {}, the rollout is to end after {}; expected a --duration that is no "
                                  "shorter",
@@ -269,8 +317,8 @@ void RolloutExecution<Real>::resume() {
   batch_.restore(part.batch, arguments_.resume);
   figures_.steps = part.steps;
   figures_.step_seconds = part.step_seconds;
-  figures_.first_energy = part.first_energy;
-  figures_.most_kinetic = part.most_kinetic;
+  first_energy_ = part.first_energy;
+  most_kinetic_ = part.most_kinetic;
   looked_at_ = part.looked_at;
   std::ranges::transform(part.last_energy, energy_.begin(), [](double energy) { return static_cast<Real>(energy); });
   tell("goes on after {} of {} steps, from {}", grouped(figures_.steps), grouped(figures_.steps_planned), arguments_.resume);
@@ -320,15 +368,35 @@ void RolloutExecution<Real>::observe() {
 }
 
 template <class Real>
-void RolloutExecution<Real>::finish() {
+void RolloutExecution<Real>::gather_figures() {
   constexpr std::size_t kMostTexts = 5;
-  figures_.summary = batch_.summary();
-  figures_.last_energy.assign(energy_.begin(), energy_.end());
-  for (std::int64_t i = 0; i < arguments_.instances && figures_.failures.size() < kMostTexts; ++i) {
+  constexpr char kEnd = '\0';
+  const BatchSummary own = batch_.summary();
+  std::int64_t sums[] = {own.frozen, own.steps, own.evaluations, own.rescued, batch_.threads(), static_cast<std::int64_t>(batch_.bytes())};
+  ranks_.sum(sums);
+  figures_.summary = {.frozen = sums[0], .steps = sums[1], .evaluations = sums[2], .rescued = sums[3]};
+  figures_.threads = static_cast<int>(sums[4]), figures_.bytes = static_cast<std::size_t>(sums[5]);
+  figures_.ranks = ranks_.count(), figures_.lanes = batch_.lanes();
+  ranks_.most({&figures_.step_seconds, 1});
+  last_energy_.assign(energy_.begin(), energy_.end());
+  figures_.energy = energy_change(ranks_, own_, arguments_.instances, first_energy_, last_energy_, most_kinetic_);
+
+  std::string failures;
+  std::size_t count = 0;
+  for (std::int64_t i = 0; i < own_.count && count < kMostTexts; ++i) {
     const InstanceRecord& record = batch_.record(i);
     if (record.status == StepStatus::converged) continue;
-    figures_.failures.push_back(fmt::format("instance {} at {:.6g} s: {}", i,
-                                            static_cast<double>(record.steps) * arguments_.options.step, batch_.describe(i)));
+    failures += fmt::format("instance {} at {:.6g} s: {}", own_.first + i, static_cast<double>(record.steps) * arguments_.options.step,
+                            batch_.describe(i));
+    failures += kEnd;
+    count += 1;
+  }
+  for (const std::string& of_rank : ranks_.gather(failures)) {
+    for (std::size_t at = 0; at < of_rank.size() && figures_.failures.size() < kMostTexts;) {
+      const std::size_t end = of_rank.find(kEnd, at);
+      figures_.failures.push_back(of_rank.substr(at, end - at));
+      at = end + 1;
+    }
   }
 }
 

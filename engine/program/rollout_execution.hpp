@@ -9,9 +9,11 @@
 
 #include "engine/batch.hpp"
 #include "engine/distributed/parted_recording.hpp"
+#include "engine/distributed/ranks.hpp"
 #include "engine/files/rollout_file.hpp"
 #include "engine/initial_state.hpp"
 #include "engine/program/interrupt.hpp"
+#include "engine/program/progress.hpp"
 #include "engine/program/quantities.hpp"
 #include "engine/program/randomize.hpp"
 #include "engine/program/rollout_checkpoint.hpp"
@@ -27,9 +29,14 @@ namespace linden {
 template <class Real>
 class RolloutExecution {
  public:
-  /// checkpoints: null where none are kept.
-  RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Ranks& ranks,
+  /// Of the rank's share of the instances. checkpoints: null where none are kept.
+  RolloutExecution(Ranks& ranks, const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps,
                    RolloutCheckpoints* checkpoints);
+
+  // each by all ranks
+
+  /// The files that are written while it goes on.
+  void begin();
 
   void steps(const Interrupt& interrupt);
 
@@ -40,7 +47,8 @@ class RolloutExecution {
 
  private:
   /// What is drawn and how to step are the command line's; the start was looked at (look_at_start).
-  static Scene scene_of(const RolloutArguments& arguments, const Model& model);
+  static Scene scene_of(const RolloutArguments& arguments, const Model& model, std::int64_t first);
+  // i: among the instances of all ranks
   std::uint64_t seed_of(std::int64_t i) const { return randomness(arguments_)->seed + static_cast<std::uint64_t>(i); }
   InitialState start_of(std::int64_t i) const;
   DrawnNumbers drawn_of(std::int64_t i) const { return draw(arguments_.randomization, *model_, effects_, seed_of(i)); }
@@ -48,14 +56,19 @@ class RolloutExecution {
   /// Of the first instance that runs.
   void account_of_one(const Interrupt& interrupt);
 
-  void begin_recording(const std::vector<FixedArray>& drawn);
+  /// All steps of a stretch.
+  void advance(std::int64_t end, Progress& progress);
+
+  /// What was asked for, but observations.
+  std::vector<RecordedArray> arrays_of_what();
+  bool records() const { return !arguments_.record.empty(); }
   void recording(const std::function<void()>& work);
 
   /// Energies of all instances, and a frame of the file.
   void look();
 
-  /// What the instances are now goes into a checkpoint, and what was recorded of them is put in place.
-  void keep();
+  /// What the instances are now goes into a checkpoint, and what was recorded of them is put in place; nothing where a rank has failed.
+  void keep(bool failed);
   /// The instances are what they were in the checkpoint.
   void resume();
   /// Of the recording, after the steps that were taken.
@@ -69,18 +82,22 @@ class RolloutExecution {
   /// What was asked for beside what_, an array of each behind those.
   void observe();
 
-  void finish();
+  /// What is told of the instances of all ranks.
+  void gather_figures();
 
-  const RolloutArguments& arguments_;
   Ranks& ranks_;
+  const InstanceRange own_;
+  const RolloutArguments& arguments_;
   RolloutCheckpoints* const checkpoints_;
   std::shared_ptr<const Model> model_;
   const Effects effects_;
   const std::optional<Observations> observations_;
   BatchOf<Real> batch_;
   RolloutFigures figures_;
-  std::optional<RolloutFile<Real>> file_;
-  std::optional<PartedRecording<Real>> parts_;  // in its place where there are checkpoints
+  DrawnArrays drawn_;
+  std::vector<double> first_energy_, last_energy_, most_kinetic_;  // of each of the own instances [J]
+  std::optional<RolloutFile<Real>> file_;       // of one rank
+  std::optional<PartedRecording<Real>> parts_;  // of several, or with checkpoints
   std::vector<Quantity> what_;              // that is recorded
   std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
   std::vector<Real> energy_, observed_;

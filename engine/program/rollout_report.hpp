@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/drift.hpp"
+#include "engine/program/energy_change.hpp"
 #include "engine/program/rollout_command.hpp"
 
 namespace linden {
@@ -24,10 +25,10 @@ struct AccountOfOne {
 struct RolloutFigures {
   std::int64_t steps_planned = 0, steps = 0;  // of each instance
   double step_seconds = 0, total_seconds = 0;  // by the clock: within Batch::step, and everything
-  int lanes = 0, threads = 0;
+  int ranks = 1, lanes = 0, threads = 0;  // threads: of all ranks
   std::size_t bytes = 0;  // kept of the instances
   BatchSummary summary;
-  std::vector<double> first_energy, last_energy, most_kinetic;  // of each instance [J]
+  EnergyChange energy;
   std::vector<std::string> failures;                            // the first few, one sentence each
   std::optional<AccountOfOne> account;                          // where effects act
   int signal = 0;                                               // that ended the rollout

@@ -163,6 +163,23 @@ TEST_CASE("a recording goes on behind what is in place, with other ranks too, an
   CHECK(folder.files().size() == 2 + 3 + 2);
 }
 
+TEST_CASE("a master shows the frames that all ranks have, and the next segment goes on behind them") {
+  const Folder folder;
+  for (const std::exception_ptr& thrown : at_ranks(3, [&](Ranks& ranks) {
+         const InstanceRange own = share_of(kAll, ranks.rank(), ranks.count());
+         PartedRecording<double> recording(ranks, folder.file("run.h5"), kAll, some_arrays(), drawn_of(own));
+         for (int f = 0; f < 3 + ranks.rank(); ++f) add<double>(recording, f, own);
+         recording.end_segment();
+         if (recording.frames() != 3) throw std::runtime_error("frames");
+         for (int f = 3; f < 6 - ranks.rank() / 2; ++f) add<double>(recording, f, own);
+         recording.commit();
+         if (recording.frames() != 5) throw std::runtime_error("frames");
+       })) {
+    CHECK_FALSE(thrown);
+  }
+  check_equal(read(folder.file("run.h5")), whole<double>(5));
+}
+
 TEST_CASE("a recording is replaced with its parts, by one in parts or by one that is whole, and by nothing less") {
   const Folder folder;
   record<double>(folder.file("run.h5"), 2, 0, 3);

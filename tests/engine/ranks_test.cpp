@@ -5,6 +5,9 @@
 #include <random>
 
 #include "engine/distributed/exact_sum.hpp"
+#include "engine/distributed/order_statistic.hpp"
+#include "engine/distributed/stretches.hpp"
+#include "engine/program/energy_change.hpp"
 #include "layout/support/input_error.hpp"
 #include "tests/engine/turns.hpp"
 
@@ -80,6 +83,68 @@ TEST_CASE("sums, least and most are the same for any number of ranks, and known 
   }
 }
 
+void check_none(const std::vector<std::exception_ptr>& thrown) {
+  for (const std::exception_ptr& one : thrown) CHECK_FALSE(one);
+}
+
+void require(bool condition, const char* what) {
+  if (!condition) throw std::runtime_error(what);
+}
+
+TEST_CASE("mean, median, most and the first instance with it are those of sorted numbers, for any number of ranks") {
+  std::mt19937_64 random(3);
+  for (const std::int64_t instances : {1, 2, 7, 200}) {
+    std::vector<double> last, sizes, zeros(static_cast<std::size_t>(instances)), ones(static_cast<std::size_t>(instances), 1);
+    for (std::int64_t i = 0; i < instances; ++i) {
+      last.push_back(std::ldexp(static_cast<double>(random() % 9) - 4, static_cast<int>(random() % 3)));
+      sizes.push_back(std::abs(last.back()));
+    }
+    const auto most = std::ranges::max_element(sizes);
+    const std::int64_t worst = *most > 0 ? most - sizes.begin() : 0;
+    const double top = *most;
+    std::vector<double> sorted = sizes;
+    std::ranges::sort(sorted);
+    for (const int count : {1, 2, 5}) {
+      if (count > instances) continue;
+      check_none(at_ranks(count, [&](Ranks& ranks) {
+        const InstanceRange own = share_of(instances, ranks.rank(), ranks.count());
+        const auto part = [&](const std::vector<double>& all) {
+          return std::span(all).subspan(static_cast<std::size_t>(own.first), static_cast<std::size_t>(own.count));
+        };
+        const EnergyChange found = energy_change(ranks, own, instances, part(zeros), part(last), part(ones));
+        require(found.mean == sum_of(last) / static_cast<double>(instances), "mean");
+        require(found.median == sorted[static_cast<std::size_t>(instances / 2)], "median");
+        require(found.most == top && found.worst == worst, "most");
+        for (std::int64_t n = 0; n < instances; ++n) {
+          require(nth_smallest(ranks, part(sizes), n) == sorted[static_cast<std::size_t>(n)], "n-th");
+        }
+      }));
+    }
+  }
+}
+
+TEST_CASE("ranks of different speed go through the same stretches, and end after the same step where one has a signal or has failed") {
+  for (const int count : {1, 2, 3}) {
+    for (const int kind : {0, 1, 2}) {  // to the end, a signal, a failure
+      std::vector<std::vector<std::int64_t>> ends(static_cast<std::size_t>(count));
+      check_none(at_ranks(count, [&](Ranks& ranks) {
+        Stretches stretches(ranks, 1000);
+        bool more = true;
+        while (more) {
+          ends[static_cast<std::size_t>(ranks.rank())].push_back(stretches.end());
+          const bool now = ranks.rank() == count - 1 && stretches.end() > 100;
+          more = stretches.next(0.002 * (1 + ranks.rank()), kind == 1 && now ? 15 : 0, kind == 2 && now);
+        }
+        require(stretches.signal() == (kind == 1 ? 15 : 0), "signal");
+        require(stretches.failed() == (kind == 2), "failed");
+      }));
+      for (const std::vector<std::int64_t>& of_rank : ends) CHECK(of_rank == ends.front());
+      CHECK(std::ranges::is_sorted(ends.front()));
+      CHECK((kind == 0 ? ends.front().back() == 1000 : ends.front().back() < 1000));
+    }
+  }
+}
+
 TEST_CASE("work that fails at some ranks ends at all with one message and one exit code") {
   const auto codes_and_messages = [](int count, const std::function<void(int)>& work) {
     std::vector<std::pair<int, std::string>> found;
@@ -99,6 +164,7 @@ TEST_CASE("work that fails at some ranks ends at all with one message and one ex
   CHECK(codes_and_messages(3, [](int) {}) == Found(3, {0, ""}));
   CHECK(codes_and_messages(3, [](int) { throw InputError("bad"); }) == Found{{2, "bad"}, {2, ""}, {2, ""}});
   CHECK(codes_and_messages(1, [](int) { throw std::runtime_error("full"); }) == Found{{1, "full"}});
+  CHECK(codes_and_messages(3, [](int rank) { if (rank == 0) throw InputError("seen by one"); }) == Found{{2, "seen by one"}, {2, ""}, {2, ""}});
   const Found some = codes_and_messages(4, [](int rank) {
     if (rank == 3) throw InputError("no file");
     if (rank == 2) throw std::runtime_error("full");

@@ -52,6 +52,7 @@ class ThreadRanks final : public Ranks {
   int rank() const override { return rank_; }
   int count() const override { return count_; }
   int threads() const override { return 1; }
+  int neighbours() const override { return count_; }
   void barrier() override { turns_.exchange(rank_, ""); }
   void sum(std::span<std::int64_t> numbers) override {
     fold(numbers, [](std::int64_t a, std::int64_t b) { return a + b; });
