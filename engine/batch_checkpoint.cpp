@@ -9,9 +9,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <mutex>
 
 #include "engine/batch_data.hpp"
+#include "engine/batch_instances.hpp"
 #include "engine/checkpoint_bytes.hpp"
 #include "engine/effects/effect_owners.hpp"
 #include "engine/files/output_file.hpp"
@@ -133,7 +136,57 @@ std::vector<InstanceRecord> sound_records(const CheckpointReader& in, const Data
   return records;
 }
 
+/// What a checkpoint holds before its instances, of how many and of which size they are.
+struct BatchParts {
+  BatchHeader header;
+  std::string_view effects, instances;
+  std::size_t of_each;
+};
+
+BatchParts parts_of(CheckpointReader& in, std::size_t size) {
+  BatchParts parts{in.header<BatchHeader>(), {}, {}, 0};
+  const std::size_t effects = in.size_of("effects", parts.header.effects);
+  const std::size_t around = kOfBatch.line.size() + sizeof(BatchHeader) + effects + sizeof(std::uint64_t);
+  const auto count = static_cast<std::size_t>(std::max<std::int64_t>(parts.header.instances, 0));
+  const std::size_t numbers = size - std::min(size, around);
+  if (count == 0 || numbers % count != 0) in.impossible(fmt::format("{} instances in {} bytes", parts.header.instances, numbers));
+  in.numbers(effects + numbers);
+  parts.effects = in.next(effects);
+  parts.instances = in.next(numbers);
+  parts.of_each = numbers / count;
+  return parts;
+}
+
 }  // namespace
+
+std::string joined_instances(std::span<const InstancesOf> parts) {
+  if (parts.empty()) throw InputError("instances are to be joined, and there are none; give one part at least");
+  std::string all;
+  std::int64_t count = 0;
+  for (const InstancesOf& part : parts) {
+    CheckpointBytes bytes(part.bytes, part.name);
+    CheckpointReader in(bytes, kOfBatch);
+    BatchParts found = parts_of(in, part.bytes.size());
+    if (part.first < 0 || part.first >= part.last || part.last > found.header.instances) {
+      throw InputError(fmt::format("{}: instances {} to {} are asked of a checkpoint of {}; expected some of these", part.name, part.first,
+                                   part.last - 1, found.header.instances));
+    }
+    found.header.instances = 0;  // told at the end
+    std::string before(reinterpret_cast<const char*>(&found.header), sizeof(BatchHeader));
+    before += found.effects;
+    if (all.empty()) all = before;
+    if (!all.starts_with(before)) {
+      throw InputError(fmt::format("{}: this checkpoint is one of other instances than {}: of another model, step, gravity or precision, "
+                                   "with other effects, or with other rows that were set; join what belongs together",
+                                   part.name, parts.front().name));
+    }
+    const auto first = static_cast<std::size_t>(part.first), last = static_cast<std::size_t>(part.last);
+    all += found.instances.substr(first * found.of_each, (last - first) * found.of_each);
+    count += part.last - part.first;
+  }
+  std::memcpy(all.data() + offsetof(BatchHeader, instances), &count, sizeof(count));
+  return sealed(kOfBatch.line, all);
+}
 
 template <class Real>
 std::string BatchOf<Real>::checkpoint() const {

@@ -12,6 +12,7 @@
 namespace linden {
 namespace {
 
+bool speaking = true;
 int lost = 0;  // errno of what failed first on standard output
 
 void note(bool fine) {
@@ -20,12 +21,16 @@ void note(bool fine) {
 
 }  // namespace
 
+void speak(bool whether) { speaking = whether; }
+
 void say_text(std::string_view text) {
+  if (!speaking) return;
   errno = 0;
   note(std::fwrite(text.data(), 1, text.size(), stdout) == text.size());
 }
 
 void show_text(std::string_view text) {
+  if (!speaking) return;
   std::fwrite(text.data(), 1, text.size(), stderr);
   std::fflush(stderr);
 }

@@ -10,6 +10,9 @@
 
 namespace linden {
 
+/// Whether this process says anything: of several that do the same one speaks.
+void speak(bool whether);
+
 /// Text on standard output.
 void say_text(std::string_view text);
 template <class... Arguments>

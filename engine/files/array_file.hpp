@@ -13,15 +13,13 @@ namespace linden {
 
 enum class ElementType : std::uint8_t { float32, float64, uint8 };
 
-/// All functions throw std::runtime_error: `FILE: cannot be written: reason`. After that nothing but commit, which puts in place what was
-/// whole before, and the destructor may be called, after commit the destructor alone.
-class ArrayFile {
+/// What arrays there are. All functions throw std::runtime_error: `FILE: cannot be written: reason`.
+class ArrayLayout {
  public:
-  ArrayFile() = default;
-  /// What was not committed is deleted.
-  virtual ~ArrayFile() = default;
-  ArrayFile(const ArrayFile&) = delete;
-  ArrayFile& operator=(const ArrayFile&) = delete;
+  ArrayLayout() = default;
+  virtual ~ArrayLayout() = default;
+  ArrayLayout(const ArrayLayout&) = delete;
+  ArrayLayout& operator=(const ArrayLayout&) = delete;
 
   /// An array [rows, row...] that has no rows yet. columns: what its numbers are called in a table; empty: they are in none.
   virtual void add_numbers(const std::string& name, ElementType type, std::vector<std::int64_t> row, std::vector<std::string> columns) = 0;
@@ -31,6 +29,12 @@ class ArrayFile {
   virtual void add_fixed(const std::string& name, std::vector<std::int64_t> shape, std::span<const double> numbers) = 0;
   /// An array [words]. Words are UTF-8.
   virtual void add_words(const std::string& name, std::span<const std::string> words) = 0;
+};
+
+/// After an error nothing but commit, which puts in place what was whole before, and the destructor may be called, after commit the
+/// destructor alone. What was not committed is deleted.
+class ArrayFile : public ArrayLayout {
+ public:
   /// A row of every array of numbers, in the order in which they were added. Where the disk has no room for all of them, and for what
   /// commit needs, none is.
   virtual void append(std::span<const void* const> rows) = 0;
@@ -46,7 +50,8 @@ std::unique_ptr<ArrayFile> npz_file(const std::string& file);
 /// A table: a line of names, then one a row, of all arrays that have names for their numbers. Words are left out.
 std::unique_ptr<ArrayFile> csv_file(const std::string& file);
 
-/// For h5py.File: HDF5, every array a chunked dataset, written where it stays.
-std::unique_ptr<ArrayFile> h5_file(const std::string& file);
+/// For h5py.File: HDF5, every array a dataset in chunks (engine/files/h5_chunks.hpp), written where it stays. Up to 16 MiB of rows of each
+/// array wait in memory for their chunks to be full. packers: threads that compress them; 0: they stay as they are.
+std::unique_ptr<ArrayFile> h5_file(const std::string& file, int packers);
 
 }  // namespace linden

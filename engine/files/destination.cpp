@@ -19,19 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kDigits = 8;
 constexpr std::string_view kAfterNumber = ".part";
 
 std::string before_number(const fs::path& place) { return fmt::format(".{}.linden.", place.filename().string()); }
-
-/// What is in a folder is on the disk by its names too, where the system can do that.
-int sync_folder(const fs::path& folder) {
-  const int file = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (file < 0) return 0;  // it may be written to and not be read
-  const int error = ::fsync(file) != 0 && errno != EINVAL ? errno : 0;
-  ::close(file);
-  return error;
-}
 
 /// The end of a chain of symbolic links, be there a file or not.
 fs::path followed(fs::path path) {
@@ -62,6 +52,14 @@ std::string obstacle(const std::string& file) {
 
 }  // namespace
 
+int sync_folder(const fs::path& folder) {
+  const int file = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return 0;  // it may be written to and not be read
+  const int error = ::fsync(file) != 0 && errno != EINVAL ? errno : 0;
+  ::close(file);
+  return error;
+}
+
 void cannot_be_written(const std::string& file, std::string_view reason) {
   throw std::runtime_error(fmt::format("{}: cannot be written: {}", file, reason));
 }
@@ -76,9 +74,11 @@ Destination::Destination(std::string file) : file_(std::move(file)), place_(foll
   throw InputError(fmt::format("{}: this is {}; expected an ordinary file, or a name that is free; choose another", file_, found));
 }
 
-std::string Destination::temporary() const {
+std::string Destination::letters() { return fmt::format("{:0{}x}", std::random_device{}(), kDigits); }
+
+std::string Destination::temporary(std::string_view letters) const {
   fs::path path = place_;
-  path.replace_filename(fmt::format("{}{:08x}{}", before_number(place_), std::random_device{}(), kAfterNumber));
+  path.replace_filename(fmt::format("{}{}{}", before_number(place_), letters, kAfterNumber));
   return path.string();
 }
 

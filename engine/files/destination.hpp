@@ -7,6 +7,7 @@
 //   disk      the bytes are on the disk before the name is theirs, and the name is before publish returns
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -18,6 +19,9 @@ namespace linden {
 /// The reason is an errno.
 [[noreturn]] void cannot_be_written(const std::string& file, int error);
 
+/// What is in a folder is on the disk by its names too, where the system can do that. Returns an errno.
+int sync_folder(const std::filesystem::path& folder);
+
 class Destination {
  public:
   /// Throws InputError where `file` leads to something else than an ordinary file.
@@ -28,7 +32,11 @@ class Destination {
   /// With links followed.
   const std::filesystem::path& place() const { return place_; }
   /// A hidden name beside it that nobody else has: .NAME.linden.LETTERS.part
-  std::string temporary() const;
+  std::string temporary() const { return temporary(letters()); }
+  std::string temporary(std::string_view letters) const;
+  /// So many digits from 0 to f that nobody else has.
+  static constexpr std::size_t kDigits = 8;
+  static std::string letters();
   /// Whether a file of that name in its folder is such a one.
   bool is_temporary(std::string_view name) const;
   /// Renames what is ready onto it. Throws cannot_be_written.

@@ -4,8 +4,10 @@
 
 #include <hdf5.h>
 
+#include <cstddef>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace linden {
 
@@ -20,7 +22,12 @@ class Handle {
   Handle(hid_t id, Close closing) : id_(id), close_(closing) {}
   ~Handle() { close(); }
   Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
-  Handle& operator=(Handle&&) = delete;
+  Handle& operator=(Handle&& other) noexcept {
+    close();
+    id_ = std::exchange(other.id_, H5I_INVALID_HID);
+    close_ = other.close_;
+    return *this;
+  }
 
   hid_t id() const { return id_; }
   herr_t close() {
@@ -33,6 +40,19 @@ class Handle {
   hid_t id_;
   Close close_;
 };
+
+/// Files that the numbers of a virtual dataset lie in, by its creation property list, as it names them; empty for any other.
+inline std::vector<std::string> virtual_files(hid_t creation) {
+  std::vector<std::string> files;
+  std::size_t count = 0;
+  if (H5Pget_layout(creation) != H5D_VIRTUAL || H5Pget_virtual_count(creation, &count) < 0) return files;
+  for (std::size_t k = 0; k < count; ++k) {
+    const ssize_t length = H5Pget_virtual_filename(creation, k, nullptr, 0);
+    std::string& name = files.emplace_back(static_cast<std::size_t>(length < 0 ? 0 : length) + 1, '\0');
+    if (H5Pget_virtual_filename(creation, k, name.data(), name.size()) >= 0) name.pop_back();
+  }
+  return files;
+}
 
 /// What went wrong first in the call that failed.
 inline std::string first_error() {

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <set>
 
 #include "engine/files/array_readers.hpp"
 #include "engine/files/h5_handle.hpp"
@@ -48,6 +50,7 @@ class H5Reader {
     if (axes > 0) require(H5Sget_simple_extent_dims(space.id(), sizes.data(), nullptr) >= 0);
     const std::vector<std::int64_t> shape(sizes.begin(), sizes.end());
     const std::size_t count = count_of(file_name_, name, shape);
+    require_parts(dataset);
     const H5T_class_t kind = H5Tget_class(type.id());
     if (kind == H5T_FLOAT || kind == H5T_INTEGER) {
       std::vector<double> numbers(count);
@@ -66,6 +69,17 @@ class H5Reader {
     }
   }
 
+  /// Of a recording in parts (h5_master.hpp): HDF5 reads what is not there as if it held no numbers.
+  void require_parts(hid_t dataset) {
+    const Handle creation(H5Dget_create_plist(dataset), H5Pclose);
+    require(creation.id() >= 0);
+    const std::filesystem::path folder = std::filesystem::canonical(file_name_).parent_path();
+    for (const std::string& part : virtual_files(creation.id())) {
+      if (!found_.insert(part).second || std::filesystem::exists(folder / part)) continue;
+      throw InputError(fmt::format("{}: its part {} is not there; expected it beside the file; copy or move the folder with it", file_name_, part));
+    }
+  }
+
   void require(bool done) const {
     if (done) return;
     throw InputError(fmt::format("{}: {}; expected a .h5 file that linden or h5py wrote", file_name_, first_error()));
@@ -74,6 +88,7 @@ class H5Reader {
   std::string file_name_;
   Handle file_;
   RecordedArrays arrays_;
+  std::set<std::string> found_;  // parts that are there
 };
 
 }  // namespace

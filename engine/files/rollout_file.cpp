@@ -20,10 +20,10 @@ namespace {
 const std::string kStatuses[] = {"converged", "not_converged", "past_pi", "gains_energy", "not_finite"};
 static_assert(std::size(kStatuses) == static_cast<std::size_t>(StepStatus::not_finite) + 1, "every status has a name");
 
-std::unique_ptr<ArrayFile> array_file(const std::string& file, std::int64_t instances) {
+std::unique_ptr<ArrayFile> array_file(const std::string& file, std::int64_t instances, int packers) {
   const std::string ending = std::filesystem::path(file).extension().string();
   if (ending == ".npz") return npz_file(file);
-  if (ending == ".h5") return h5_file(file);
+  if (ending == ".h5") return h5_file(file, packers);
   if (ending == ".csv" && instances == 1) return csv_file(file);
   cannot_be_written(file, fmt::format("the file's name ends in \"{}\"; expected .npz or .h5", ending));
 }
@@ -33,8 +33,14 @@ void require_length(std::string_view what, std::size_t found, std::size_t expect
   throw std::invalid_argument(fmt::format("a frame with {} numbers of {}; expected {}", found, what, expected));
 }
 
-/// Arrays called as another one is, or as what every file has, are followed by _2.
-std::vector<RecordedArray> distinct(std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed) {
+std::vector<std::string> prefixed(const std::string& prefix, std::vector<std::string> names) {
+  for (std::string& name : names) name.insert(0, prefix);
+  return names;
+}
+
+}  // namespace
+
+std::vector<RecordedArray> with_own_names(std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed) {
   std::set<std::string> taken{"time", "energy", "status", "statuses"};
   for (const FixedArray& array : fixed) {
     taken.insert(array.name);
@@ -49,12 +55,33 @@ std::vector<RecordedArray> distinct(std::vector<RecordedArray> arrays, const std
   return arrays;
 }
 
-std::vector<std::string> prefixed(const std::string& prefix, std::vector<std::string> names) {
-  for (std::string& name : names) name.insert(0, prefix);
-  return names;
+template <class Real>
+void declare(ArrayLayout& arrays, std::int64_t instances, const std::vector<RecordedArray>& recorded, const std::vector<FixedArray>& fixed) {
+  constexpr ElementType kReal = std::is_same_v<Real, float> ? ElementType::float32 : ElementType::float64;
+  arrays.add_numbers("time", ElementType::float64, {}, {"time"});
+  arrays.add_numbers("energy", kReal, {instances}, {"energy"});
+  for (const RecordedArray& array : recorded) {
+    arrays.add_numbers(array.name, kReal, {instances, std::ssize(array.rows)}, prefixed(array.prefix, array.rows));
+    if (!array.units.empty()) arrays.describe(array.rows, array.units);
+  }
+  arrays.add_numbers("status", ElementType::uint8, {instances}, {});
+  for (const FixedArray& array : fixed) {
+    std::vector<std::int64_t> shape{instances};
+    if (!array.names.empty()) shape.push_back(std::ssize(array.columns));
+    arrays.add_fixed(array.name, shape, array.numbers);
+  }
+  std::set<std::string> named;
+  for (const RecordedArray& array : recorded) {
+    if (named.insert(array.names).second) arrays.add_words(array.names, array.rows);
+  }
+  for (const FixedArray& array : fixed) {
+    if (!array.names.empty() && named.insert(array.names).second) arrays.add_words(array.names, array.columns);
+  }
+  arrays.add_words("statuses", kStatuses);
 }
 
-}  // namespace
+template void declare<double>(ArrayLayout&, std::int64_t, const std::vector<RecordedArray>&, const std::vector<FixedArray>&);
+template void declare<float>(ArrayLayout&, std::int64_t, const std::vector<RecordedArray>&, const std::vector<FixedArray>&);
 
 RecordedArray recorded_positions(const Names& names) { return {"q", "positions", names.position, ""}; }
 RecordedArray recorded_velocities(const Names& names) { return {"v", "velocities", names.velocity, "v."}; }
@@ -75,30 +102,9 @@ struct RolloutFile<Real>::Data {
 
 template <class Real>
 RolloutFile<Real>::RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> recorded,
-                               const std::vector<FixedArray>& fixed)
-    : data_(new Data{file, instances, distinct(std::move(recorded), fixed), array_file(file, instances)}) {
-  constexpr ElementType kReal = std::is_same_v<Real, float> ? ElementType::float32 : ElementType::float64;
-  ArrayFile& arrays = *data_->arrays;
-  arrays.add_numbers("time", ElementType::float64, {}, {"time"});
-  arrays.add_numbers("energy", kReal, {instances}, {"energy"});
-  for (const RecordedArray& array : data_->recorded) {
-    arrays.add_numbers(array.name, kReal, {instances, std::ssize(array.rows)}, prefixed(array.prefix, array.rows));
-    if (!array.units.empty()) arrays.describe(array.rows, array.units);
-  }
-  arrays.add_numbers("status", ElementType::uint8, {instances}, {});
-  for (const FixedArray& array : fixed) {
-    std::vector<std::int64_t> shape{instances};
-    if (!array.names.empty()) shape.push_back(std::ssize(array.columns));
-    arrays.add_fixed(array.name, shape, array.numbers);
-  }
-  std::set<std::string> named;
-  for (const RecordedArray& array : data_->recorded) {
-    if (named.insert(array.names).second) arrays.add_words(array.names, array.rows);
-  }
-  for (const FixedArray& array : fixed) {
-    if (!array.names.empty() && named.insert(array.names).second) arrays.add_words(array.names, array.columns);
-  }
-  arrays.add_words("statuses", kStatuses);
+                               const std::vector<FixedArray>& fixed, int packers)
+    : data_(new Data{file, instances, with_own_names(std::move(recorded), fixed), array_file(file, instances, packers)}) {
+  declare<Real>(*data_->arrays, instances, data_->recorded, fixed);
 }
 
 template <class Real>

@@ -33,6 +33,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/files/array_file.hpp"
 #include "layout/names.hpp"
 
 namespace linden {
@@ -54,6 +55,12 @@ struct FixedArray {
   std::vector<double> numbers;       // [N x columns], or [N]
 };
 
+/// Arrays called as another one is, or as what every recording has, are followed by _2.
+std::vector<RecordedArray> with_own_names(std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed);
+/// All that a recording consists of; names are different. The numbers of fixed arrays may be left out where the layout takes none.
+template <class Real>
+void declare(ArrayLayout& arrays, std::int64_t instances, const std::vector<RecordedArray>& recorded, const std::vector<FixedArray>& fixed);
+
 RecordedArray recorded_positions(const Names& names);
 RecordedArray recorded_velocities(const Names& names);
 
@@ -62,7 +69,9 @@ class RolloutFile {
  public:
   /// FILE.npz, FILE.h5 or, of one instance, FILE.csv. Throws std::runtime_error, as add and commit do: `FILE: cannot be written: reason`.
   /// After that add throws again, and commit puts the frames before in place; nothing else is left in the folder.
-  RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed = {});
+  /// packers: threads that compress FILE.h5; 0: it is not compressed. No bit that is read back depends on it.
+  RolloutFile(const std::string& file, std::int64_t instances, std::vector<RecordedArray> arrays, const std::vector<FixedArray>& fixed = {},
+              int packers = 0);
   /// With q and v.
   RolloutFile(const std::string& file, const Names& names, std::int64_t instances)
       : RolloutFile(file, instances, {recorded_positions(names), recorded_velocities(names)}) {}

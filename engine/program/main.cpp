@@ -8,13 +8,16 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <new>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "engine/distributed/ranks.hpp"
 #include "engine/program/accuracy_command.hpp"
 #include "engine/program/inspect.hpp"
 #include "engine/program/option_texts.hpp"
+#include "engine/program/rollout_checkpoint.hpp"
 #include "engine/program/rollout_command.hpp"
 #include "engine/program/run_command.hpp"
 #include "engine/program/scaling_command.hpp"
@@ -153,19 +156,27 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
   add("Output", "--what", texts.what, "LIST", "of positions, velocities (default: both) and energies");
   add("Output", "--observe", texts.observe, "LIST", "observations beside it: pose:hand,com,imu:head; see linden run --help");
   add("Output", "--every", texts.every, "K", "a frame every K steps, default 1");
+  command->add_flag("--compress", rollout.compress, "a --record FILE.h5 is compressed, without loss: smaller, and slower to write")->group("Output");
   add("Output", "--json", rollout.json, "FILE.json", "the figures of the summary, for scripts");
+  add("Checkpoints", "--checkpoint", rollout.checkpoint, "DIR", "keep the state of all instances in this folder, to go on from");
+  add("Checkpoints", "--checkpoint-every", texts.checkpoint_every, "S", "seconds by the clock between two, default 600");
+  add("Checkpoints", "--keep", texts.keep, "N", "how many stay there, default the newest 2");
+  add("Checkpoints", "--resume", rollout.resume, "DIR", "go on, to the bit, from the newest one there; the other options as they were");
   add.views(texts, rollout.views);
   add("Pictures", "--shown", texts.shown, "N", "instances that are shown, default the first 16");
   command->footer(
       "An instance that fails is frozen at its last good state, the others go on. Quaternions are x y z w. Ctrl-C, SIGTERM and SIGHUP end\n"
-      "a rollout early and keep its files; on a full disk it ends with what fits.\n\n"
+      "a rollout early and keep its files; on a full disk it ends with what fits. With --checkpoint it goes on from there, and from wherever it was\n"
+      "killed, as if nothing had happened (--resume).\n\n"
       "--randomize masses=0.2,friction=0.4:1.0,gains=0.1 draws for each instance, by its seed: a factor from 0.8 to 1.2 for the mass of each\n"
       "body, the friction of the ground from 0.4 to 1.0, a factor for the gains of each servo; joint_friction likewise. It goes over what a\n"
       "scene says, and what was drawn is in the --record file.\n\n"
       "Examples:\n"
       "  linden rollout models/humanoid.urdf --base floating --instances 10000 --duration 1 --spread 0.5\n"
       "  linden rollout models/scenes/humanoid_drop.yaml --instances 1024 --spread 0.02\n"
-      "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10");
+      "  linden rollout models/arm.urdf --instances 4096 --duration 2 --record arms.npz --every 10\n"
+      "  linden rollout models/arm.urdf --instances 4096 --duration 600 --record arms.h5 --every 100 --checkpoint state\n"
+      "  linden rollout models/arm.urdf --instances 4096 --duration 600 --record arms.h5 --every 100 --resume state");
   return command;
 }
 
@@ -291,6 +302,26 @@ void refuse_leftovers(const CLI::App& app, const std::string& command) {
                                              : fmt::format("did you mean {}?", guess)));
 }
 
+int report_error(std::string_view message, int exit_code) {
+  speak(true);
+  tell_text(message);
+  return exit_code;
+}
+
+/// A command that all ranks work on; the first of them speaks for all.
+int by_ranks(const std::function<int(Ranks& ranks)>& command) {
+  const std::unique_ptr<Ranks> ranks = ranks_of_program();
+  speak(ranks->first());
+  try {
+    return command(*ranks);
+  } catch (const std::exception& error) {
+    if (!ranks->several() || ranks->ending()) throw;
+    const int exit_code = report_error(error.what(), exit_code_of(error));
+    ranks->abort(exit_code);
+    return exit_code;
+  }
+}
+
 int run_program(int argc, char** argv) {
   CLI::App program("Simulates trees of rigid bodies with a variational integrator, in time linear in their number.", "linden");
   program.set_version_flag("--version", fmt::format("linden {}", kVersion));
@@ -327,6 +358,7 @@ int run_program(int argc, char** argv) {
     say_text(with_single_gaps(program.help()));
     return 0;
   } catch (const CLI::ParseError& error) {
+    if (rollout->parsed() && told_rank() > 0) throw ToldElsewhere{2};
     if (error.get_exit_code() == 0) return program.exit(error);  // --version
     std::string help = "linden";
     for (const CLI::App* command : {run, rollout, view, accuracy, scaling, inspection}) {
@@ -343,9 +375,15 @@ int run_program(int argc, char** argv) {
     return run_command(run_arguments);
   }
   if (rollout->parsed()) {
-    refuse_leftovers(*rollout, "linden rollout");
-    read_rollout_options(texts, rollout_arguments);
-    return rollout_command(rollout_arguments);
+    return by_ranks([&](Ranks& ranks) {
+      together(ranks, [&] {
+        refuse_leftovers(*rollout, "linden rollout");
+        read_rollout_options(texts, rollout_arguments);
+        const std::span<const char* const> words(argv, static_cast<std::size_t>(argc));
+        rollout_arguments.command_to_resume = command_to_resume(words, rollout_arguments.checkpoint);
+      });
+      return rollout_command(ranks, rollout_arguments);
+    });
   }
   if (view->parsed()) {
     refuse_leftovers(*view, "linden view");
@@ -372,14 +410,11 @@ int run_program(int argc, char** argv) {
 
 constexpr const char* kNoMemory = "there is not enough memory for that; choose a smaller model or fewer instances, or allow more (ulimit -v)";
 
-int report_error(std::string_view message, int exit_code) {
-  tell_text(message);
-  return exit_code;
-}
-
 int guarded(int argc, char** argv) {
   try {
     return run_program(argc, argv);
+  } catch (const ToldElsewhere& elsewhere) {
+    return elsewhere.exit_code;
   } catch (const MemoryError& error) {
     return report_error(error.what(), 1);
   } catch (const InputError& error) {

@@ -116,6 +116,23 @@ void read_recording_options(const OptionTexts& texts, Arguments& arguments) {
   read_view_options(texts.views, arguments.views);
 }
 
+void read_checkpoint_options(const OptionTexts& texts, RolloutArguments& rollout) {
+  if (rollout.checkpoint.empty()) rollout.checkpoint = rollout.resume;
+  for (const auto& [option, text] : {std::pair{"--checkpoint-every", texts.checkpoint_every}, {"--keep", texts.keep}}) {
+    if (!text.empty() && rollout.checkpoint.empty()) {
+      throw InputError(fmt::format("{} is about checkpoints: give --checkpoint, or --resume, a folder for them too", option));
+    }
+  }
+  if (!texts.checkpoint_every.empty()) {
+    rollout.checkpoint_every = number_from("--checkpoint-every", texts.checkpoint_every, "seconds by the clock, such as 600");
+    if (!(rollout.checkpoint_every > 0)) {
+      throw InputError(fmt::format("--checkpoint-every {}: expected seconds by the clock above zero, such as 600", texts.checkpoint_every));
+    }
+  }
+  if (!texts.keep.empty()) rollout.checkpoints_kept = integer_from("--keep", texts.keep, "how many checkpoints, such as 2");
+  if (rollout.checkpoints_kept < 1) throw InputError(fmt::format("--keep {}: expected 1 checkpoint or more", rollout.checkpoints_kept));
+}
+
 void read_randomize_option(const OptionTexts& texts, MotionArguments& motion) {
   if (motion.scene) motion.randomization = motion.scene->randomization;
   if (!texts.randomize.empty()) randomize_from(texts.randomize, motion.effects(), motion.randomization);
@@ -173,6 +190,7 @@ void read_rollout_options(const OptionTexts& texts, RolloutArguments& rollout) {
     rollout.computed.threads = static_cast<int>(std::clamp<std::int64_t>(threads, -1, 1 << 20));
   }
   if (!texts.instructions.empty()) rollout.computed.instructions = instructions_from(texts.instructions);
+  read_checkpoint_options(texts, rollout);
 }
 
 void read_scaling_options(const OptionTexts& texts, ScalingArguments& scaling) {

@@ -4,36 +4,45 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
-#include <stdexcept>
 #include <vector>
 
 #include "engine/files/output_file.hpp"
-#include "engine/files/report_files.hpp"
-#include "engine/files/rollout_file.hpp"
-#include "engine/initial_state.hpp"
-#include "engine/program/effects_text.hpp"
 #include "engine/program/interrupt.hpp"
 #include "engine/program/progress.hpp"
-#include "engine/program/randomize.hpp"
+#include "engine/program/rollout_execution.hpp"
 #include "engine/program/rollout_report.hpp"
 #include "engine/program/run_report.hpp"
 #include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
 #include "engine/text.hpp"
-#include "engine/view/animation_recorder.hpp"
-#include "engine/view/curves.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {
 namespace {
 
 using Clock = Progress::Clock;
+
+void check_checkpoints(const RolloutArguments& arguments) {
+  if (arguments.checkpoint.empty()) return;
+  if (!arguments.resume.empty() && !Destination::same(arguments.checkpoint, arguments.resume)) {
+    throw InputError(fmt::format("--checkpoint {} and --resume {}: a rollout that goes on keeps its checkpoints where they were; leave "
+                                 "--checkpoint out",
+                                 arguments.checkpoint, arguments.resume));
+  }
+  if (arguments.record.ends_with(".npz")) {
+    throw InputError(fmt::format("--record {}: with --checkpoint and --resume a recording grows part by part, which .npz cannot; expected a "
+                                 "name that ends in .h5",
+                                 arguments.record));
+  }
+  if (arguments.views.any()) {
+    throw InputError("--checkpoint and --resume are for rollouts that may end in one process and go on in another, and pictures are made by "
+                     "one that has seen the whole motion: leave --view, --gltf, --picture and --film out, --record the motion, and show it "
+                     "with linden view");
+  }
+}
 
 Outputs checked_outputs(const RolloutArguments& arguments) {
   if (arguments.every < 1) throw InputError(fmt::format("--every {}: expected 1 step or more between frames", arguments.every));
@@ -42,6 +51,10 @@ Outputs checked_outputs(const RolloutArguments& arguments) {
   if (!arguments.observe.empty() && arguments.record.empty()) {
     throw InputError("--observe says what --record takes beside --what: give a --record file too");
   }
+  if (arguments.compress && !arguments.record.ends_with(".h5")) {
+    throw InputError("--compress is about recordings in HDF5: give a --record file that ends in .h5 too");
+  }
+  check_checkpoints(arguments);
   require_available(arguments.what, {Quantity::positions, Quantity::velocities, Quantity::energies}, "a rollout");
   if (arguments.shown < 1) throw InputError(fmt::format("--shown {}: expected 1 instance or more", arguments.shown));
   std::vector<Output> files{{"--record", arguments.record, {".npz", ".h5"}}, {"--json", arguments.json, {".json"}}};
@@ -49,302 +62,56 @@ Outputs checked_outputs(const RolloutArguments& arguments) {
   return Outputs(files);
 }
 
+/// What several ranks cannot do.
+void check_shared(const Ranks& ranks, const RolloutArguments& arguments) {
+  if (!ranks.several()) return;
+  if (!arguments.record.empty() && !arguments.record.ends_with(".h5")) {
+    throw InputError(fmt::format("--record {}: {} ranks write one recording in parts, which .h5 alone has; expected .h5", arguments.record,
+                                 ranks.count()));
+  }
+  if (arguments.instances < ranks.count()) {
+    throw InputError(fmt::format("--instances {}: there are {} ranks; expected an instance for each, or more; start fewer ranks",
+                                 arguments.instances, ranks.count()));
+  }
+  if (const std::int64_t here = share_of(arguments.instances, 0, ranks.count()).count; arguments.views.any() && arguments.shown > here) {
+    throw InputError(fmt::format("--shown {}: rank 0 shows those of its own instances, which are {}; expected no more", arguments.shown, here));
+  }
+}
+
 /// Refuses more instances than this machine's memory holds, with what is computed of all of them at once. observed: numbers of each.
 template <class Real>
-void check_instances(const RolloutArguments& arguments, const Shape& shape, double observed) {
+void check_instances(const Ranks& ranks, const RolloutArguments& arguments, const Shape& shape, double observed) {
   const double nq = shape.positions, nv = shape.velocities;
   double numbers = nq + 3 * nv + 2 /* kept */ + nv + 2 /* Batch::observe */ + 1;
   if (!arguments.record.empty()) numbers += nq + nv + 2 * observed;
+  if (!arguments.checkpoint.empty()) numbers += 3 * (nq + 3 * nv + 2);  // the bytes of a checkpoint, and parts of them
   if (arguments.randomization.masses) numbers += (arguments.record.empty() ? 11.0 : 13.0) * shape.slots;
   const double each = numbers * sizeof(Real) + sizeof(InstanceRecord) + 2 * sizeof(double) + 1;
-  require_memory(fmt::format("{} instances of {}", grouped(arguments.instances), arguments.model),
-                 static_cast<double>(arguments.instances) * each);
+  const std::int64_t here = share_of(arguments.instances, ranks.rank(), ranks.count()).count * ranks.neighbours();
+  require_memory(fmt::format("{} instances of {}", grouped(here), arguments.model), static_cast<double>(here) * each);
 }
 
-/// One rollout from its start to its files.
 template <class Real>
-class RolloutExecution {
- public:
-  RolloutExecution(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps)
-      : arguments_(arguments),
-        model_(std::move(model)),
-        effects_(arguments.effects()),
-        observations_(observations_of(*model_, effects_, arguments.observe)),
-        batch_(scene_of(arguments, *model_), arguments.instances, arguments.computed) {
-    figures_.steps_planned = steps;
-    figures_.lanes = batch_.lanes();
-    figures_.threads = batch_.threads();
-    DrawnArrays drawn(arguments.record.empty() ? Randomization() : arguments.randomization, *model_, effects_, arguments.instances);
-    batch_.reset_all([&](std::int64_t i, std::span<double> positions, std::span<double> velocities) {
-      const InitialState state = start_of(i);
-      std::ranges::copy(state.positions, positions.begin());
-      std::ranges::copy(state.velocities, velocities.begin());
-      if (!drawn.arrays().empty()) drawn.set(i, drawn_of(i));
-    });
-    look_at_instances(arguments, arguments.options, arguments.instances, [&](std::int64_t i) {
-      const auto rows = batch_.positions().instance(i);
-      return std::vector<double>(rows.begin(), rows.end());
-    });
-    figures_.bytes = batch_.bytes();
-    if (!arguments.record.empty()) {
-      what_ = arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what;
-      const Names& names = batch_.model().names;
-      std::vector<RecordedArray> arrays;
-      for (const Quantity quantity : what_) {
-        arrays.push_back(quantity == Quantity::positions    ? recorded_positions(names)
-                         : quantity == Quantity::velocities ? recorded_velocities(names)
-                                                            : RecordedArray{"energies", "energy_names", {"kinetic", "potential"}, "energy."});
-        numbers_.emplace_back(static_cast<std::size_t>(arguments.instances) * arrays.back().rows.size());
-      }
-      if (observations_) {
-        for (RecordedArray& array : recorded_observations(*observations_)) arrays.push_back(std::move(array));
-        observed_.resize(static_cast<std::size_t>(arguments.instances * observations_->width()));
-        observe();  // refuses accelerations where there are none
-      }
-      status_.resize(static_cast<std::size_t>(arguments.instances));
-      file_.emplace(arguments.record, arguments.instances, std::move(arrays), drawn.arrays());
-    }
-    energy_.resize(static_cast<std::size_t>(arguments.instances));
-    if (arguments.views.any()) begin_views();
-  }
-
-  void steps(const Interrupt& interrupt) {
-    Progress progress(figures_.steps_planned, arguments_.options.step);
-    std::int64_t stretch = 1;  // steps between two looks at the clock
-    look();
-    look_at_shown();
-    while (figures_.steps < figures_.steps_planned && figures_.lost.empty() && interrupt.signal() == 0) {
-      std::int64_t end = std::min(figures_.steps_planned, figures_.steps + stretch);
-      if (file_) end = std::min(end, (figures_.steps / arguments_.every + 1) * arguments_.every);
-      if (recorder_) end = std::min(end, (figures_.steps / frame_stride_ + 1) * frame_stride_);
-      const Clock::time_point begin = Clock::now();
-      batch_.step(end - figures_.steps);
-      const Clock::time_point now = Clock::now();
-      const double taken = seconds(now - begin);
-      figures_.step_seconds += taken;
-      figures_.steps = end;
-      if (taken > 0.4) stretch = std::max<std::int64_t>(1, stretch / 2);
-      if (taken < 0.1) stretch = std::min(2 * stretch, figures_.steps_planned);
-      if (file_ && figures_.steps % arguments_.every == 0) look();
-      if (recorder_ && figures_.steps % frame_stride_ == 0) look_at_shown();
-      progress.update(figures_.steps, now);
-    }
-    if (looked_at_ != figures_.steps) look();
-    if (recorder_ && figures_.steps % frame_stride_ != 0) look_at_shown();
-    if (figures_.steps < figures_.steps_planned && figures_.lost.empty()) figures_.signal = interrupt.signal();
-    finish();
-    if (figures_.signal == 0 && figures_.lost.empty()) account_of_one(interrupt);
-  }
-
-  /// Complaints go to stderr; true where there were none.
-  bool write_files() {
-    bool fine = true;
-    if (file_) {
-      const std::string before = figures_.lost;
-      recording([&] {
-        file_->commit();
-        figures_.frames = file_->frames();
-      });
-      if (!before.empty()) figures_.lost = before;
-      fine = figures_.lost.empty();
-    }
-    if (recorder_) {
-      WrittenViews views = write_views(arguments_.views, recorder_->animation());
-      figures_.views = std::move(views.lines);
-      fine = fine && views.fine;
-    }
-    if (!arguments_.json.empty()) {
-      fine = attempt([&] { write_json(arguments_.json, rollout_json(arguments_, batch_.model(), figures_)); }) && fine;
-    }
-    return fine;
-  }
-
-  RolloutFigures& figures() { return figures_; }
-
- private:
-  /// What is drawn and how to step are the command line's; the start was looked at (look_at_start).
-  static Scene scene_of(const RolloutArguments& arguments, const Model& model) {
-    Scene scene;
-    if (arguments.scene) scene = *arguments.scene;
-    else scene.model = model;
-    scene.options = arguments.options;
-    scene.randomization = arguments.randomization;
-    scene.seed = randomness(arguments)->seed;
-    scene.start_as_given = true;
-    return scene;
-  }
-  std::uint64_t seed_of(std::int64_t i) const { return randomness(arguments_)->seed + static_cast<std::uint64_t>(i); }
-  InitialState start_of(std::int64_t i) const {
-    const double spread = randomness(arguments_)->spread;
-    if (!arguments_.scene) return random_state(*model_, seed_of(i), spread);
-    return random_around(*model_, arguments_.scene->initial, seed_of(i), spread, effects_.limits);
-  }
-  DrawnNumbers drawn_of(std::int64_t i) const { return draw(arguments_.randomization, *model_, effects_, seed_of(i)); }
-
-  /// Of the first instance that runs.
-  void account_of_one(const Interrupt& interrupt) {
-    constexpr std::int64_t kMostAccounted = 10'000, kSamples = 2'000;
-    if (effect_lines(effects_, *model_).empty()) return;
-    AccountOfOne one;
-    while (one.instance < arguments_.instances && batch_.record(one.instance).status != StepStatus::converged) ++one.instance;
-    if (one.instance == arguments_.instances) return;
-    std::shared_ptr<const Model> model = model_;
-    Effects effects = effects_;
-    if (arguments_.randomization.any()) {
-      const auto own = std::make_shared<Model>(*model_);
-      apply(drawn_of(one.instance), *own, effects);
-      model = own;
-    }
-    Simulation alone(model, arguments_.options, effects);
-    const InitialState start = start_of(one.instance);
-    alone.set_positions(start.positions);
-    alone.set_velocities(start.velocities);
-    const std::int64_t steps = std::min(figures_.steps, kMostAccounted), stretch = (steps + kSamples - 1) / kSamples;
-    one.energy = EnergyDrift(steps / stretch + 1);
-    const auto sample = [&] {
-      one.taken = alone.effect_work().taken();
-      one.given = alone.effect_work().given();
-      one.energy.add(alone.time(), alone.energy(), one.taken, one.given);
-    };
-    sample();
-    while (one.steps < steps) {
-      if (interrupt.signal() != 0) return;
-      const StepsReport report = alone.run(std::min(stretch, steps - one.steps));
-      one.steps += report.steps;
-      sample();
-      if (!report.ok()) {
-        one.warnings.push_back(alone.describe(report.last));
-        break;
-      }
-    }
-    for (std::string& warning : energy_warnings(alone, one.energy)) one.warnings.push_back(std::move(warning));
-    figures_.account = std::move(one);
-  }
-
-  void recording(const std::function<void()>& work) {
-    try {
-      work();
-    } catch (const std::runtime_error& error) {
-      figures_.lost = error.what();
-    }
-  }
-
-  /// Energies of all instances, and a frame of the file.
-  void look() {
-    const auto seen = batch_.observe();
-    const auto velocities = seen.velocities(), energies = seen.energies();
-    const auto positions = batch_.positions();
-    const bool first = looked_at_ < 0;
-    if (first) {
-      figures_.first_energy.resize(energy_.size());
-      figures_.most_kinetic.resize(energy_.size());
-    }
-    for (std::int64_t i = 0; i < arguments_.instances; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      const auto kinetic = static_cast<double>(energies(i, 0));
-      const double total = kinetic + static_cast<double>(energies(i, 1));
-      energy_[at] = static_cast<Real>(total);
-      if (first) figures_.first_energy[at] = total;
-      figures_.most_kinetic[at] = std::max(figures_.most_kinetic[at], kinetic);
-      if (!file_) continue;
-      for (std::size_t k = 0; k < what_.size(); ++k) {
-        const auto& from = what_[k] == Quantity::positions ? positions : what_[k] == Quantity::velocities ? velocities : energies;
-        std::ranges::copy(from.instance(i), numbers_[k].begin() + i * from.rows());
-      }
-      status_[at] = static_cast<std::uint8_t>(batch_.record(i).status);
-    }
-    if (file_ && figures_.lost.empty()) {
-      if (observations_) observe();
-      const std::vector<std::span<const Real>> arrays(numbers_.begin(), numbers_.end());
-      recording([&] { file_->add(static_cast<double>(figures_.steps) * arguments_.options.step, arrays, energy_, status_); });
-    }
-    looked_at_ = figures_.steps;
-  }
-
-  void begin_views() {
-    const std::int64_t shown = std::min(arguments_.shown, arguments_.instances);
-    const FrameStride stride = frame_stride(figures_.steps_planned, arguments_.options.step, arguments_.views.fps,
-                                            shown * model_->tree.bodies());
-    frame_stride_ = stride.steps;
-    recorder_.emplace(*model_, effects_, model_->names.model, shown);
-    if (!stride.note.empty()) recorder_->add_note(stride.note);
-    if (shown < arguments_.instances) {
-      recorder_->add_note(fmt::format("the first {} of {} instances", grouped(shown), grouped(arguments_.instances)));
-    }
-    constexpr std::int64_t kMostCurves = 2000;
-    for (std::int64_t i = 0; i < shown && shown * model_->tree.shape.positions <= kMostCurves; ++i) {
-      recorder_->add_curves(position_curves(*model_, i));
-    }
-  }
-
-  /// A frame of the instances that are shown.
-  void look_at_shown() {
-    if (!recorder_) return;
-    shown_positions_.clear();
-    for (std::int64_t i = 0; i < std::min(arguments_.shown, arguments_.instances); ++i) {
-      const auto rows = batch_.positions().instance(i);
-      shown_positions_.insert(shown_positions_.end(), rows.begin(), rows.end());
-    }
-    recorder_->add(static_cast<double>(figures_.steps) * arguments_.options.step, shown_positions_, shown_positions_);
-  }
-
-  /// What was asked for beside what_, an array of each behind those.
-  void observe() {
-    batch_.observe(*observations_, std::span<Real>(observed_));
-    const auto width = static_cast<std::size_t>(observations_->width());
-    numbers_.resize(what_.size());
-    for (const Observed& entry : observations_->layout()) {
-      std::vector<Real>& to = numbers_.emplace_back();
-      for (std::size_t at = static_cast<std::size_t>(entry.offset); at < observed_.size(); at += width) {
-        to.insert(to.end(), observed_.begin() + static_cast<std::ptrdiff_t>(at),
-                  observed_.begin() + static_cast<std::ptrdiff_t>(at) + entry.width);
-      }
-    }
-  }
-
-  void finish() {
-    constexpr std::size_t kMostTexts = 5;
-    figures_.summary = batch_.summary();
-    figures_.last_energy.assign(energy_.begin(), energy_.end());
-    for (std::int64_t i = 0; i < arguments_.instances && figures_.failures.size() < kMostTexts; ++i) {
-      const InstanceRecord& record = batch_.record(i);
-      if (record.status == StepStatus::converged) continue;
-      figures_.failures.push_back(fmt::format("instance {} at {:.6g} s: {}", i,
-                                              static_cast<double>(record.steps) * arguments_.options.step, batch_.describe(i)));
-    }
-  }
-
-  const RolloutArguments& arguments_;
-  std::shared_ptr<const Model> model_;
-  const Effects effects_;
-  const std::optional<Observations> observations_;
-  BatchOf<Real> batch_;
-  RolloutFigures figures_;
-  std::optional<RolloutFile<Real>> file_;
-  std::vector<Quantity> what_;              // that is recorded
-  std::vector<std::vector<Real>> numbers_;   // of it, instance by instance
-  std::vector<Real> energy_, observed_;
-  std::vector<std::uint8_t> status_;
-  std::optional<AnimationRecorder> recorder_;  // of the instances that are shown
-  std::int64_t frame_stride_ = 1;
-  std::vector<double> shown_positions_;
-  std::int64_t looked_at_ = -1;
-};
-
-template <class Real>
-int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin) {
-  const std::optional<Observations> observations = observations_of(*model, arguments.effects(), arguments.observe);
-  check_instances<Real>(arguments, model->tree.shape, observations ? static_cast<double>(observations->width()) : 0);
+int execute(Ranks& ranks, const RolloutArguments& arguments, std::shared_ptr<const Model> model, std::int64_t steps, Clock::time_point begin,
+            RolloutCheckpoints* checkpoints) {
   const Interrupt interrupt;
-  RolloutExecution<Real> rollout(arguments, model, steps);
-  rollout.steps(interrupt);
-  RolloutFigures& figures = rollout.figures();
+  std::optional<RolloutExecution<Real>> rollout;
+  together(ranks, [&] {
+    const std::optional<Observations> observations = observations_of(*model, arguments.effects(), arguments.observe);
+    check_instances<Real>(ranks, arguments, model->tree.shape, observations ? static_cast<double>(observations->width()) : 0);
+    rollout.emplace(ranks, arguments, model, steps, checkpoints);
+  });
+  together(ranks, [&] { rollout->begin(); });
+  rollout->steps(interrupt);
+  RolloutFigures& figures = rollout->figures();
+  if (checkpoints) figures.checkpoint = checkpoints->text();
   figures.total_seconds = seconds(Clock::now() - begin);
-  const bool written = rollout.write_files();
+  const bool written = rollout->write_files();
   say_text(rollout_summary(arguments, *model, figures));
+  const std::string to_go_on = checkpoints && !checkpoints->command().empty() ? "; to go on: " + checkpoints->command() : "";
   if (figures.signal != 0) {
-    tell("interrupted after {} of {} steps{}", grouped(figures.steps), grouped(figures.steps_planned),
-               figures.frames > 0 ? fmt::format("; {} is valid up to there", arguments.record) : "");
+    tell("interrupted after {} of {} steps{}{}", grouped(figures.steps), grouped(figures.steps_planned),
+         figures.frames > 0 ? fmt::format("; {} is valid up to there", arguments.record) : "", to_go_on);
     return 128 + figures.signal;
   }
   if (figures.account) {
@@ -353,31 +120,59 @@ int execute(const RolloutArguments& arguments, std::shared_ptr<const Model> mode
     }
   }
   if (!figures.lost.empty()) {
-    tell("{}; {}; the rollout ended after {} of {} steps", figures.lost,
+    tell("{}; {}; the rollout ended after {} of {} steps{}", figures.lost,
          figures.frames > 0 ? fmt::format("it holds {}", counted(figures.frames, "frame")) : "no frame of it is kept", grouped(figures.steps),
-         grouped(figures.steps_planned));
+         grouped(figures.steps_planned), to_go_on);
   }
   if (figures.summary.frozen > 0) {
     tell("{} of {} instances failed and were frozen at their last good state", grouped(figures.summary.frozen),
                grouped(arguments.instances));
   }
-  return written && figures.summary.frozen == 0 ? 0 : 1;
+  return written && figures.kept && figures.summary.frozen == 0 ? 0 : 1;
+}
+
+/// Cores that the ranks of a machine share, and instructions that all have.
+void share_processor(Ranks& ranks, RolloutArguments& arguments) {
+  BatchOptions& computed = arguments.computed;
+  if (computed.threads == 0) computed.threads = ranks.threads();
+  const auto best = static_cast<std::int64_t>(best_instructions());
+  std::int64_t least = best, most = best;
+  ranks.least({&least, 1});
+  ranks.most({&most, 1});
+  if (computed.instructions) return;
+  computed.instructions = static_cast<Instructions>(least);
+  arguments.instructions_shared = least != most;
 }
 
 }  // namespace
 
-int rollout_command(const RolloutArguments& given) {
+int rollout_command(Ranks& ranks, RolloutArguments arguments) {
   const Clock::time_point begin = Clock::now();
-  RolloutArguments arguments = given;
-  check(arguments.options);
-  const std::int64_t steps = step_count(arguments, arguments.options.step);
-  const Outputs outputs = checked_outputs(arguments);
+  std::int64_t steps = 0;
+  std::shared_ptr<const Model> model;
   if (!arguments.seed) arguments.seed = 1;  // instances that are all alike would be no rollout
-  const std::shared_ptr<const Model> model = arguments.loaded(outputs);
-  print_warnings(*model);
-  check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
-  look_at_start(arguments, *model, arguments.options);
-  return arguments.single ? execute<float>(arguments, model, steps, begin) : execute<double>(arguments, model, steps, begin);
+  together(ranks, [&] {
+    check(arguments.options);
+    steps = step_count(arguments, arguments.options.step);
+    // one looks at the files that are written
+    const Outputs outputs = ranks.first() ? checked_outputs(arguments) : Outputs({});
+    check_shared(ranks, arguments);
+    model = arguments.loaded(outputs);
+    print_warnings(*model);
+    if (ranks.first()) check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
+    look_at_start(arguments, *model, arguments.options);
+  });
+  // one that goes on has the instructions that it began with, one that begins those that all ranks have
+  std::optional<RolloutCheckpoints> kept;
+  if (!arguments.resume.empty()) kept.emplace(arguments, *model, ranks);
+  if (ranks.several()) share_processor(ranks, arguments);
+  if (!arguments.checkpoint.empty() && !kept) kept.emplace(arguments, *model, ranks);
+  RolloutCheckpoints* const checkpoints = kept ? &*kept : nullptr;
+  const int own = arguments.single ? execute<float>(ranks, arguments, model, steps, begin, checkpoints)
+                                   : execute<double>(ranks, arguments, model, steps, begin, checkpoints);
+  std::int64_t exit_code = own;
+  ranks.most({&exit_code, 1});
+  return static_cast<int>(exit_code);
 }
 
 }  // namespace linden

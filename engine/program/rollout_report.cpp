@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -15,29 +14,6 @@
 namespace linden {
 namespace {
 
-/// Change of energy from the first state to the last, over the instances, relative to each one's largest kinetic energy.
-struct EnergyChange {
-  double mean = 0, median = 0, most = 0;  // mean keeps the sign: it shows a drift that all share
-  std::int64_t worst = 0;                 // instance
-
-  explicit EnergyChange(const RolloutFigures& figures) {
-    std::vector<double> sizes;
-    for (std::size_t i = 0; i < figures.first_energy.size(); ++i) {
-      const double scale = figures.most_kinetic[i];
-      const double change = scale > 0 ? (figures.last_energy[i] - figures.first_energy[i]) / scale : 0;
-      mean += change / static_cast<double>(figures.first_energy.size());
-      sizes.push_back(std::abs(change));
-      if (std::abs(change) > most) {
-        most = std::abs(change);
-        worst = static_cast<std::int64_t>(i);
-      }
-    }
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    median = *middle;
-  }
-};
-
 double ns_per_body_step(const Model& model, const RolloutFigures& figures) {
   return 1e9 * figures.threads / (figures.steps_per_second() * model.tree.bodies());
 }
@@ -48,6 +24,11 @@ double evaluations_mean(const RolloutFigures& figures) {
 
 double factors_mean(const RolloutFigures& figures) {
   return static_cast<double>(figures.summary.factors) / static_cast<double>(figures.summary.steps);
+}
+
+std::string instructions_text(const RolloutArguments& arguments) {
+  const std::string used(name(arguments.computed.instructions.value_or(best_instructions())));
+  return arguments.instructions_shared ? used + ", the best that all ranks have" : used;
 }
 
 }  // namespace
@@ -77,8 +58,9 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                             options.order == 2 ? "" : fmt::format("order {}, ", options.order), options.step,
                             arguments.single ? std::max(options.tolerance, kSingleTolerance) : options.tolerance,
                             gravity_text(options)));
-  row("processor", fmt::format("{} of {} instances ({})", counted(figures.threads, "thread"), figures.lanes,
-                               name(arguments.computed.instructions.value_or(best_instructions()))));
+  row("processor", fmt::format("{}{} of {} instances ({})", figures.ranks > 1 ? fmt::format("{} ranks, ", grouped(figures.ranks)) : "",
+                               counted(figures.threads, "thread"), figures.lanes,
+                               instructions_text(arguments)));
   if (figures.summary.steps > 0) {
     const double simulated = static_cast<double>(figures.steps) * options.step;
     row("rollout", figures.signal == 0 ? fmt::format("{:.6g} s, {} of every instance", simulated, counted(figures.steps, "step"))
@@ -92,7 +74,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                                       ? fmt::format("; {} taken alone", counted(figures.summary.rescued, "step"))
                                       : ""));
     // where effects give and take its change says nothing
-    const EnergyChange energy(figures);
+    const EnergyChange& energy = figures.energy;
     if (effect_lines(effects, model).empty()) row("energy", fmt::format("changes by {:+.1e} of the kinetic energy in the mean, {:.1e} in the median, {:.1e} at most (instance {})",
                               energy.mean, energy.median, energy.most, grouped(energy.worst)));
   }
@@ -110,6 +92,7 @@ std::string rollout_summary(const RolloutArguments& arguments, const Model& mode
                                                                    : ", the energy of that instance is not accounted for"));
   }
   if (figures.frames > 0) row("", printable(fmt::format("{}: {}", arguments.record, counted(figures.frames, "frame"))));
+  if (!figures.checkpoint.empty()) row("checkpoint", printable(figures.checkpoint));
   for (const std::string& view : figures.views) row("", printable(view));
   if (figures.summary.frozen > 0) {
     row("frozen", fmt::format("{} at the last good state:", counted(figures.summary.frozen, "instance")));
@@ -123,7 +106,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
   using Json = nlohmann::ordered_json;
   const Options& options = arguments.options;
   const auto random = randomness(arguments);
-  const EnergyChange energy(figures);
+  const EnergyChange& energy = figures.energy;
   const bool ran = figures.summary.steps > 0;
   const auto if_ran = [&](double value) { return ran && std::isfinite(value) ? Json(value) : Json(nullptr); };
   return Json{
@@ -135,6 +118,7 @@ nlohmann::ordered_json rollout_json(const RolloutArguments& arguments, const Mod
       {"bodies", model.tree.bodies()},
       {"dofs", model.degrees_of_freedom()},
       {"instances", arguments.instances},
+      {"ranks", figures.ranks},
       {"threads", figures.threads},
       {"lanes", figures.lanes},
       {"instructions", name(arguments.computed.instructions.value_or(best_instructions()))},

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/drift.hpp"
+#include "engine/program/energy_change.hpp"
 #include "engine/program/rollout_command.hpp"
 
 namespace linden {
@@ -24,15 +25,17 @@ struct AccountOfOne {
 struct RolloutFigures {
   std::int64_t steps_planned = 0, steps = 0;  // of each instance
   double step_seconds = 0, total_seconds = 0;  // by the clock: within Batch::step, and everything
-  int lanes = 0, threads = 0;
+  int ranks = 1, lanes = 0, threads = 0;  // threads: of all ranks
   std::size_t bytes = 0;  // kept of the instances
   BatchSummary summary;
-  std::vector<double> first_energy, last_energy, most_kinetic;  // of each instance [J]
+  EnergyChange energy;
   std::vector<std::string> failures;                            // the first few, one sentence each
   std::optional<AccountOfOne> account;                          // where effects act
   int signal = 0;                                               // that ended the rollout
   std::int64_t frames = 0;                                      // recorded
   std::vector<std::string> views;                               // files that show the motion, and what each holds
+  bool kept = true;                                             // the checkpoint that was to be written last
+  std::string checkpoint;                                       // where there are some, and what the newest is
   std::string lost;                                             // why the recording ended early, and the rollout with it
 
   double steps_per_second() const { return static_cast<double>(summary.steps) / step_seconds; }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/standard_streams.hpp"
 #include "engine/start_check.hpp"
 #include "engine/text.hpp"
 #include "layout/support/input_error.hpp"
@@ -13,7 +14,7 @@
 namespace linden {
 namespace {
 
-void note(const std::string& text) { fmt::print(stderr, "linden: note: {}\n", printable(text)); }
+void note(const std::string& text) { tell("note: {}", text); }
 
 /// A load that gravity is missing beside: "a ground", "servos", "springs"; empty where there is none.
 std::string load_of(const Effects& effects) {
@@ -32,10 +33,9 @@ void look_at_scene(const MotionArguments& arguments, const Options& options) {
   if (!found.sound()) {
     const std::string text = fmt::format("{}: {}", arguments.model, found.text());
     if (!scene.start_as_given && !arguments.start_as_given) throw InputError(text);
-    fmt::print(stderr, "linden: warning: {}: it starts outside of what holds it, as given: {}\n", printable(arguments.model),
-               printable(fmt::format("{}", fmt::join(found.faults, "; "))));
+    tell("warning: {}: it starts outside of what holds it, as given: {}", arguments.model, fmt::join(found.faults, "; "));
   }
-  for (const std::string& told : found.told) fmt::print(stderr, "linden: warning: {}: {}\n", printable(arguments.model), printable(told));
+  for (const std::string& told : found.told) tell("warning: {}: {}", arguments.model, told);
   const std::string load = load_of(scene.effects);
   const bool weightless = options.gravity == std::array<double, 3>{0, 0, 0};
   if (weightless && !scene.gravity_named && !arguments.gravity_given && !load.empty()) {
@@ -61,21 +61,23 @@ void look_at_start(const MotionArguments& arguments, const Model& model, const O
   if (!randomness(arguments)) look_at_zero(arguments, model);  // random positions keep the file's limits
 }
 
-void look_at_instances(const MotionArguments& arguments, const Options& options, std::int64_t instances,
+void look_at_instances(const MotionArguments& arguments, const Options& options, std::int64_t instances, Ranks& ranks, InstanceRange own,
                        const std::function<std::vector<double>(std::int64_t i)>& positions) {
   if (!arguments.scene || !arguments.scene->effects.ground || arguments.scene->start_as_given || arguments.start_as_given) return;
   const StartCheck check(arguments.scene->model, options, arguments.scene->effects);
   std::int64_t count = 0;
   std::string first;
-  for (std::int64_t i = 0; i < instances; ++i) {
+  for (std::int64_t i = 0; i < own.count; ++i) {
     const StartFindings found = check.look_under(positions(i));
     if (found.sound()) continue;
-    if (count == 0) first = fmt::format("instance {}: {}", i, found.faults.front());
+    if (count == 0) first = fmt::format("instance {}: {}", own.first + i, found.faults.front());
     count += 1;
   }
+  ranks.sum({&count, 1});
+  first = first_text(ranks, first);
   if (count == 0) return;
-  fmt::print(stderr, "linden: warning: {} of {} instances start in the ground, by their random joints ({}); raise the base or choose a "
-             "smaller --spread\n", grouped(count), grouped(instances), printable(first));
+  tell("warning: {} of {} instances start in the ground, by their random joints ({}); raise the base or choose a smaller --spread",
+       grouped(count), grouped(instances), first);
 }
 
 }  // namespace linden

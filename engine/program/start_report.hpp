@@ -11,6 +11,7 @@
 #include <functional>
 #include <vector>
 
+#include "engine/distributed/ranks.hpp"
 #include "engine/options.hpp"
 #include "engine/program/motion_arguments.hpp"
 
@@ -20,8 +21,8 @@ namespace linden {
 void look_at_start(const MotionArguments& arguments, const Model& model, const Options& options);
 
 /// Of a rollout whose instances start at random about a scene's start: one warning where some of them start in the ground.
-/// positions(i): [nq] of instance i.
-void look_at_instances(const MotionArguments& arguments, const Options& options, std::int64_t instances,
+/// Called by all ranks; positions(i): [nq] of the i-th of the own instances, of so many of all ranks.
+void look_at_instances(const MotionArguments& arguments, const Options& options, std::int64_t instances, Ranks& ranks, InstanceRange own,
                        const std::function<std::vector<double>(std::int64_t i)>& positions);
 
 }  // namespace linden

@@ -85,7 +85,7 @@ void print_warnings(const Model& model) {
   if (model.warnings.size() > kShown) {
     tell("warning: and {} more (linden inspect shows all)", model.warnings.size() - kShown);
   }
-  for (const std::string& note : model.notes) fmt::print(stderr, "linden: note: {}\n", printable(note));
+  for (const std::string& note : model.notes) tell("note: {}", note);
 }
 
 }  // namespace linden

@@ -1,9 +1,11 @@
 // Checkpoints of batches: all instances go on to the bit, whatever was set of them; the bytes are the same whatever the lanes are.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
 #include "engine/batch.hpp"
+#include "engine/batch_instances.hpp"
 #include "engine/simulation.hpp"
 #include "layout/support/checksum.hpp"
 #include "layout/support/input_error.hpp"
@@ -112,6 +114,51 @@ TEMPLATE_TEST_CASE("a checkpoint is the same bytes for all lanes, and goes on in
       }
       CHECK(apart < kRounding);
     }
+  }
+}
+
+TEMPLATE_TEST_CASE("instances cut from checkpoints and joined go on to the bit in as many batches as there are to be", "[batch]", Batch, FloatBatch) {
+  for (const Scene& scene : scenes()) {
+    CAPTURE(scene.model.names.model);
+    TestType whole = batch_of<TestType>(scene);
+    set_everything(whole);
+    start(whole);
+    whole.step(10);
+    const std::string bytes = whole.checkpoint();
+    const auto batch = [&](std::span<const InstancesOf> parts, std::int64_t size) {
+      TestType some(scene.model, size, scene.options, scene.effects);
+      some.restore(joined_instances(parts));
+      return some;
+    };
+    // into batches of 4 and 7, on, and from these into one of 6 that takes of both
+    TestType first = batch(std::array{InstancesOf{bytes, "all", 0, 4}}, 4), second = batch(std::array{InstancesOf{bytes, "all", 4, 11}}, 7);
+    for (TestType* some : {&first, &second, &whole}) some->step(10);
+    const std::string of_first = first.checkpoint(), of_second = second.checkpoint();
+    const std::array both{InstancesOf{of_first, "first", 2, 4}, InstancesOf{of_second, "second", 0, 4}};
+    TestType middle = batch(both, 6);
+    middle.step(10);
+    whole.step(10);
+    const std::string all = whole.checkpoint();
+    CHECK(middle.checkpoint() == joined_instances(std::array{InstancesOf{all, "all", 2, 8}}));
+    CHECK(joined_instances(std::array{InstancesOf{all, "all", 0, 11}}) == all);
+  }
+}
+
+TEST_CASE("what cannot be joined is refused by name", "[batch]") {
+  Batch one(chain(2), 3), longer(chain(2), 3, {.step = 2e-3});
+  const std::string bytes = one.checkpoint(), other = longer.checkpoint();
+  const auto refused = [&](const std::vector<InstancesOf>& parts, const char* why) {
+    CHECK_THROWS_WITH(joined_instances(parts), Catch::Contains(why));
+  };
+  refused({}, "there are none");
+  refused({{bytes, "a", 1, 4}}, "a: instances 1 to 3 are asked of a checkpoint of 3");
+  refused({{bytes, "a", 1, 1}}, "a: instances 1 to 0");
+  refused({{bytes, "a", 0, 3}, {other, "b", 0, 3}}, "b: this checkpoint is one of other instances than a");
+  refused({{std::string_view(bytes).substr(0, bytes.size() - 9), "a", 0, 3}}, "a: ");
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string flipped = bytes;
+    flipped[at] = static_cast<char>(flipped[at] ^ 1 << at % 8);
+    REQUIRE_THROWS_AS(joined_instances(std::array{InstancesOf{flipped, "a", 0, 3}}), InputError);
   }
 }
 

@@ -92,6 +92,56 @@ TEST_CASE("a full disk keeps the rows and frames that fit, and what goes to anot
   CHECK_FALSE(has_hidden(shell));
 }
 
+TEST_CASE("checkpoints on a full disk give way to newer ones but for the last, and the rollout goes on", "[command line]") {
+  const std::string command = "rollout chain:30 --instances 200 --duration 0.1";
+  for (const auto& [size, room] : {std::pair<std::string, int>{"450k", 2}, {"250k", 1}, {"64k", 0}}) {  // a checkpoint takes 163 KB
+    INFO(size);
+    const Shell shell;
+    const Outcome outcome = on_full_disk(shell, size, command + " --keep 5 --checkpoint full/state --checkpoint-every 1e-9 --json a.json");
+    if (outcome.exit_code == 99) return;
+    CHECK(nlohmann::json::parse(text_of(shell / "a.json")).at("steps") == 100);
+    const std::filesystem::path state = shell / "kept" / "state";
+    std::set<std::string> there;
+    for (const auto& entry : std::filesystem::directory_iterator(state)) there.insert(entry.path().filename().string());
+    CHECK(static_cast<int>(there.size()) == room);
+    CHECK_FALSE(has_hidden(shell));
+    if (room == 2) {
+      CHECK(outcome.exit_code == 0);
+      CHECK(outcome.err.empty());
+      CHECK(there.contains("0000000000100"));
+    } else {
+      CHECK(outcome.exit_code == 1);
+      CHECK_THAT(outcome.err, Contains("part-0: cannot be written: No space left on device; ") &&
+                                  Contains(room == 1 ? "the newest checkpoint stays that after " : "there is no checkpoint yet"));
+    }
+    if (room > 0) CHECK(shell.linden(command + " --resume kept/state").exit_code == 0);
+  }
+}
+
+TEST_CASE("a recording whose disk was full goes on when there is room, to the bit", "[command line]") {
+  for (const char* packed : {"", " --compress"}) {
+    INFO(packed);
+    const Shell shell;
+    const std::string command = fmt::format("rollout chain:3 --instances 100 --duration 0.6{}", packed);
+    REQUIRE(shell.linden(command + " --record whole.h5").exit_code == 0);
+    const Outcome full = on_full_disk(shell, "2m", command + " --record full/a.h5 --checkpoint state");
+    if (full.exit_code == 99) return;
+    CHECK(full.exit_code == 1);
+    CHECK_THAT(full.err, StartsWith("linden: full/a.h5: cannot be written: No space left on device; it holds ") && Contains("; to go on: "));
+    const Arrays whole = read(shell.file("whole.h5")), kept = read(shell.file("kept/a.h5"));
+    const auto frames = static_cast<std::size_t>(kept.at("time").shape[0]);
+    CHECK(frames > 200);
+    CHECK(frames < 601);
+    CHECK((kept.at("q").bytes == whole.at("q").bytes.substr(0, frames * 100 * 3 * 8)));
+    std::filesystem::copy(shell / "kept", shell / "full", std::filesystem::copy_options::recursive);
+    const Outcome resumed = shell.linden(command + " --record full/a.h5 --resume state");
+    CHECK(resumed.exit_code == 0);
+    CHECK_THAT(resumed.err, Contains(fmt::format("goes on after {} of 600 steps", frames)));
+    const Arrays all = read(shell.file("full/a.h5"));
+    for (const char* array : {"time", "q", "v", "energy", "status"}) CHECK((all.at(array).bytes == whole.at(array).bytes));
+  }
+}
+
 TEST_CASE("a file that may not grow ends a run like a full disk", "[command line]") {
   const Shell shell;
   const std::string limited = "ulimit -f 64; ";  // blocks of 512 or 1,024 bytes

@@ -15,8 +15,8 @@ import linden
 from places import MODELS, ROOT
 
 EXAMPLES = ROOT / "engine" / "python" / "examples"
-# those that learn take minutes, and are tested where they belong
-SHORT = sorted(file.name for file in EXAMPLES.glob("*.py") if not file.name.startswith("learn"))
+# those that learn take minutes, and ranks are started by mpirun: they are tested where they belong
+SHORT = sorted(file.name for file in EXAMPLES.glob("*.py") if not file.name.startswith(("learn", "ranks")))
 
 
 def module_of(name: str) -> ModuleType:
