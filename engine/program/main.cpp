@@ -312,14 +312,20 @@ int report_error(std::string_view message, int exit_code) {
 int by_ranks(const std::function<int(Ranks& ranks)>& command) {
   const std::unique_ptr<Ranks> ranks = ranks_of_program();
   speak(ranks->first());
+  // mpirun ends all when one ends with an error: none does before all is said
+  int exit_code = 0;
   try {
-    return command(*ranks);
+    exit_code = command(*ranks);
+  } catch (const ToldElsewhere& elsewhere) {
+    exit_code = elsewhere.exit_code;
   } catch (const std::exception& error) {
-    if (!ranks->several() || ranks->ending()) throw;
-    const int exit_code = report_error(error.what(), exit_code_of(error));
-    ranks->abort(exit_code);
-    return exit_code;
+    if (!ranks->several()) throw;
+    exit_code = report_error(error.what(), exit_code_of(error));
+    if (!ranks->ending()) ranks->abort(exit_code);
   }
+  flush_standard_output();
+  ranks->barrier();
+  return exit_code;
 }
 
 int run_program(int argc, char** argv) {
