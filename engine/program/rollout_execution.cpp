@@ -372,10 +372,10 @@ void RolloutExecution<Real>::gather_figures() {
   constexpr std::size_t kMostTexts = 5;
   constexpr char kEnd = '\0';
   const BatchSummary own = batch_.summary();
-  std::int64_t sums[] = {own.frozen, own.steps, own.evaluations, own.rescued, batch_.threads(), static_cast<std::int64_t>(batch_.bytes())};
+  std::int64_t sums[] = {own.frozen, own.steps, own.evaluations, own.factors, own.rescued, batch_.threads(), static_cast<std::int64_t>(batch_.bytes())};
   ranks_.sum(sums);
-  figures_.summary = {.frozen = sums[0], .steps = sums[1], .evaluations = sums[2], .rescued = sums[3]};
-  figures_.threads = static_cast<int>(sums[4]), figures_.bytes = static_cast<std::size_t>(sums[5]);
+  figures_.summary = {.frozen = sums[0], .steps = sums[1], .evaluations = sums[2], .factors = sums[3], .rescued = sums[4]};
+  figures_.threads = static_cast<int>(sums[5]), figures_.bytes = static_cast<std::size_t>(sums[6]);
   figures_.ranks = ranks_.count(), figures_.lanes = batch_.lanes();
   ranks_.most({&figures_.step_seconds, 1});
   last_energy_.assign(energy_.begin(), energy_.end());

@@ -5,7 +5,8 @@
 // Sweeps run what is decided, over their own order of memory:
 //
 //   Number, kLanes, kAlone                      double or a pack; how many instances; whether one can cut, take back, refactor, continue
-//   evaluate(lanes, round)                      corrects the displacement of these lanes, the others' stays; the next evaluation of all
+//   evaluate(active, lanes, round)              corrects the displacement of these lanes, the others' stays; the next evaluation of all. Of
+//                                               those that are active the others had a state changed
 //   converged(now), close(now)                  lanes whose residual is below the tolerance; nearly so
 //   at_floor(now, epsilons)                     lanes whose residual is rounding alone
 //   has_states(), update_states(update)              effects that stick, stop or saturate: lanes in which a state changed
@@ -150,7 +151,7 @@ class Solve {
     corrections_.add(lanes);
     solved.evaluations.add(active);
     rounds_ += 1;
-    now_ = sweeps_.evaluate(lanes, rounds_);
+    now_ = sweeps_.evaluate(active, lanes, rounds_);
   }
 
   /// Of a tree that is stepped alone: all but the next correction.
@@ -174,7 +175,7 @@ class Solve {
             sweeps_.continuation(now_, updates_.of(0) == policy_.last_continuation);
           }
           updates_.add(1);
-          now_ = sweeps_.evaluate(0, rounds_);
+          now_ = sweeps_.evaluate(1, 0, rounds_);
         }
         fresh_ = 1;
       }

@@ -85,7 +85,7 @@ void TreeSolve<kEffects>::give_up(const Seen& seen) {
 }
 
 template <bool kEffects>
-Evaluated<double> TreeSolve<kEffects>::evaluate(Lanes corrected, int) {
+Evaluated<double> TreeSolve<kEffects>::evaluate(Lanes, Lanes corrected, int) {
   return corrected != 0 ? tried(sweeps_.solve_and_correct(*report_)) : sweeps_.evaluate(Factor::fresh, *report_);
 }
 

@@ -33,7 +33,7 @@ class TreeSolve {
   HeldFactor<double>& held() { return held_; }
 
   // what solve.hpp asks
-  Evaluated<double> evaluate(Lanes corrected, int round);
+  Evaluated<double> evaluate(Lanes active, Lanes corrected, int round);
   Lanes converged(const Evaluated<double>& now) const;
   Lanes close(const Evaluated<double>& now) const;
   Lanes at_floor(const Evaluated<double>& now, double epsilons) { return sweeps_.at_floor(now, fall(h_), epsilons) ? 1 : 0; }

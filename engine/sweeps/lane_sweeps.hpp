@@ -155,18 +155,17 @@ class LaneSweeps {
       now.norm = pass_up();
     }
     norm_ = guess_norm_ = now.norm;
-    changed_ = slow_ = 0;
+    slow_ = 0;
     enough_ = number(0);
     return now;
   }
 
   // what solve.hpp asks
-  Evaluated<Pack> evaluate(Lanes corrected, int round) {
+  Evaluated<Pack> evaluate(Lanes active, Lanes corrected, int round) {
     const Mask mask = L::mask(corrected);
     const Evaluation<Pack> moved = tied() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
     const Pack before = norm_;
-    const Evaluated<Pack> now = evaluated(moved, changed_ | (corrected & slow_), round % 4 == 0 ? Jacobian::exact : Jacobian::first_order);
-    changed_ = 0;
+    const Evaluated<Pack> now = evaluated(moved, (active & ~corrected) | (corrected & slow_), round % 4 == 0 ? Jacobian::exact : Jacobian::first_order);
     slow_ = (slow_ & ~corrected) | (corrected & ~L::bits(now.norm <= number(kWorn * kWorn) * before));
     if (round == 1) {
       factor_.first_correction(corrected, guess_norm_, now.norm, now.scale);
@@ -188,9 +187,12 @@ class LaneSweeps {
   }
   Lanes update_states([[maybe_unused]] const StateUpdate<Mask>& update) {
     if constexpr (kEffects) {
-      changed_ = L::bits(effects_->update_states(work_.innovation, update, work_.delta));
-      spread_mimics<Pack>(factor_.ties().mimics(), work_.delta);  // where a coordinate comes to hold, its leader's row was set
-      return changed_;
+      const Mask changed = effects_->update_states(work_.innovation, update, work_.delta);
+      for (const Mimic& mimic : factor_.ties().mimics()) {  // where a coordinate comes to hold, its leader's row was set
+        Pack& follower = work_.delta(mimic.follower_v);
+        follower = select(changed, as<Pack>(mimic.multiplier) * work_.delta(mimic.leader_v), follower);
+      }
+      return L::bits(changed);
     }
     return 0;
   }
@@ -396,7 +398,6 @@ class LaneSweeps {
   Kept<Pack> kept_;  // empty with effects
   Pack guess_norm_;    // of the first guess of the solve there is
   Pack norm_, scale_;  // of the last evaluation
-  Lanes changed_ = 0;  // states since then
   Lanes slow_ = 0;     // lanes in which a correction left too much
   Field<Pack> q_, p_, applied_;
   [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;

@@ -58,7 +58,7 @@ class ScheduleStepper {
   }
 
   // what solve.hpp asks
-  Evaluated<double> evaluate(Lanes corrected, int) {
+  Evaluated<double> evaluate(Lanes, Lanes corrected, int) {
     if (corrected == 0) return evaluate(Factor::fresh);
     corrections += 1;
     last_branch_first_ = false;  // a correction begins where the pass before it ended
