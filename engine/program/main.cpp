@@ -147,7 +147,7 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
   add.step(texts);
   add.gravity("Motion", texts);
   add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10; single precision stops at 3e-6");
-  add("Method", "--order", texts.order, "N", "of the integrator: 2 alone; run has 4, 6 and 8 too");
+  add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
   command->add_flag("--float", rollout.single, "single precision: twice as fast, half the memory")->group("Method");
   add("Processor", "--threads", texts.threads, "T", "default: all there are; results do not depend on it");
   add("Processor", "--instructions", texts.instructions, "NAME",
