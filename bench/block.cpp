@@ -16,6 +16,7 @@
 #include "bench/machine.hpp"
 #include "engine/initial_state.hpp"
 #include "kernels/block/advance_down.hpp"
+#include "kernels/block/block_factor_up.hpp"
 #include "kernels/tree/innovation_up.hpp"
 #include "kernels/tree/momentum_update_map.hpp"
 #include "kernels/tree/newton_factor_up.hpp"
@@ -104,8 +105,8 @@ struct Bench {
 
   Gains<S> gains() { return {work.gain_up, work.gain_down, work.joint_inverse}; }
   void start() { start_down(model.tree, constants, work); }
-  void factor() { block_factor_up<true>(model.tree, constants, work, gains()); }
-  void factor_exactly() { block_factor_up<false>(model.tree, constants, work, gains()); }
+  void factor() { block_factor_up(model.tree, constants, work, gains(), Jacobian::first_order); }
+  void factor_exactly() { block_factor_up(model.tree, constants, work, gains(), Jacobian::exact); }
   void correct() { correct_down(model.tree, constants, h > S(0.0), work); }
   void check() { innovation_up(model.tree, constants, work); }
   void advance() {

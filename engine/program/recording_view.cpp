@@ -16,7 +16,7 @@ namespace linden {
 namespace {
 
 /// An array [frames, instances, rows] and what of it is shown.
-struct Rows {
+struct RecordedRows {
   const NumberArray* array;
   std::vector<std::size_t> columns;
   double at(std::size_t frame, std::int64_t instance, std::size_t column) const {
@@ -99,7 +99,7 @@ class RecordingView {
 
   void add_curves(AnimationRecorder& recorder) {
     constexpr std::size_t kMostNumbers = 4'000'000;  // of an array
-    const auto take = [&](const std::string& name, Rows rows, const auto& curves_of) {
+    const auto take = [&](const std::string& name, RecordedRows rows, const auto& curves_of) {
       if (rows.columns.size() * times_.size() * static_cast<std::size_t>(shown_) > kMostNumbers) {
         recorder.add_note(fmt::format("no curves of {}: its {} rows are too many", name, rows.columns.size()));
         return;
@@ -115,7 +115,7 @@ class RecordingView {
       const auto words = arrays_.words.find(name == "v" ? "velocities" : name == "energies" ? "energy_names" : name + "_names");
       const bool named = words != arrays_.words.end() && fits(numbers, 3) && static_cast<std::int64_t>(words->second.size()) == numbers.shape[2];
       if (!named && !(name == "energy" && fits(numbers, 2))) continue;
-      Rows rows{&numbers, {}};
+      RecordedRows rows{&numbers, {}};
       for (std::size_t k = 0; k < (named ? words->second.size() : 1); ++k) rows.columns.push_back(k);
       take(name, rows, [&](std::int64_t i) {
         if (name == "v" && words->second == model_.names.velocity) return velocity_curves(model_, i);
@@ -131,11 +131,11 @@ class RecordingView {
 
   void add_frame(std::size_t frame, AnimationRecorder& recorder) {
     std::vector<double> q, numbers;
-    const auto append = [&](const Rows& rows, std::int64_t instance, std::vector<double>& to) {
+    const auto append = [&](const RecordedRows& rows, std::int64_t instance, std::vector<double>& to) {
       for (std::size_t k = 0; k < rows.columns.size(); ++k) to.push_back(rows.at(frame, instance, k));
     };
     for (std::int64_t i = 0; i < shown_; ++i) append(positions_, i, q);
-    for (const Rows& rows : curves_) {
+    for (const RecordedRows& rows : curves_) {
       for (std::int64_t i = 0; i < shown_; ++i) append(rows, i, numbers);
     }
     recorder.add(times_[frame], q, numbers);
@@ -146,8 +146,8 @@ class RecordingView {
   const Model& model_;
   std::vector<double> times_;
   std::int64_t all_ = 0, shown_ = 0;  // instances
-  Rows positions_{};
-  std::vector<Rows> curves_;  // in the order of the recorder's
+  RecordedRows positions_{};
+  std::vector<RecordedRows> curves_;  // in the order of the recorder's
 };
 
 }  // namespace

@@ -151,7 +151,7 @@ class LaneSweeps {
       now = evaluated(moved, due, Jacobian::first_order);
     } else {
       start_down(tree_, constants_, work_);
-      if (due != 0) make_factor<true>(due);
+      if (due != 0) make_factor(due, Jacobian::first_order);
       now.norm = pass_up();
     }
     norm_ = guess_norm_ = now.norm;
@@ -237,8 +237,6 @@ class LaneSweeps {
   }
 
  private:
-  /// An exact factor takes 1.7 times as long as one to first order in the turns of bodies in a step; that leaves their square of a correction.
-  enum class Jacobian : std::uint8_t { first_order, exact };
   /// A correction that leaves more than this of the residual calls for another factor.
   static constexpr double kWorn = 1e-2;
 
@@ -272,41 +270,52 @@ class LaneSweeps {
   }
 
   /// The upward half, with a factor made anew in these lanes.
-  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes fresh, Jacobian kind) {
+  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes fresh, Jacobian jacobian) {
     Evaluated<Pack> now{.least_w = moved.least_w, .energy = moved.energy};
     if constexpr (kEffects) effects_.act(constants_, work_, now.energy);
-    if (fresh != 0) kind == Jacobian::exact ? make_factor<false>(fresh) : make_factor<true>(fresh);
+    if (fresh != 0) make_factor(fresh, jacobian);
     now.norm = pass_up();
     now.scale = kEffects ? now.energy + fall() : now.energy;
     norm_ = now.norm;
     scale_ = now.scale;
     return now;
   }
-  template <bool kFirstOrder>
-  void make_factor(Lanes lanes) {
-    const auto factor = [&](const auto& added) { block_factor_up<kFirstOrder>(tree_, constants_, work_, factor_.fresh(), added); };
+  void make_factor(Lanes lanes, Jacobian jacobian) {
+    const auto factor = [&](const auto& added) { block_factor_up(tree_, constants_, work_, factor_.fresh(), jacobian, added); };
     const auto factor_tied = [&](const auto& added) { tied() ? factor(factor_.fresh_ties().held(added)) : factor(added); };
     if constexpr (kEffects) {
       effects_.with_added(factor_tied);
     } else {
       factor_tied(NothingAdded{});
     }
-    if (tied()) tie([&](Field<Pack>& x) { increments(factor_.fresh(), x); });
+    if (tied()) tie(&LaneSweeps::increments);
     factor_.take(lanes, work_);
   }
-  /// Where joints are tied to each other, what becomes of a factor with them held. down(x): the second half of a solve with it.
-  template <class Down>
-  [[gnu::noinline]] void tie(const Down& down) {
+  /// The second half of a solve: increments or rates.
+  using Down = void (LaneSweeps::*)(const Gains<Pack>& gains, Field<Pack>& x);
+  /// Where joints are tied to each other, what becomes of a factor with them held.
+  [[gnu::noinline]] void tie(Down down) {
     const Gains<Pack> gains = factor_.fresh();
     factor_.fresh_ties().factor(
         [&](const Field<Pack>& r, Field<Pack>& x) {
-          impulse_pass_up(tree_, constants_, work_.placement, gains, r, work_.bias, work_.innovation);
-          down(x);
+          impulses_up(gains, r);
+          (this->*down)(gains, x);
         },
         [&](Index i) { return tied_load(tree_, constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
   }
-  void increments(const Gains<Pack>& gains, Field<Pack>& x) {
+  // not inline: each is called in several places, and takes seconds to compile
+  [[gnu::noinline]] void impulses_up(const Gains<Pack>& gains, const Field<Pack>& r) {
+    impulse_pass_up(tree_, constants_, work_.placement, gains, r, work_.bias, work_.innovation);
+  }
+  [[gnu::noinline]] void increments(const Gains<Pack>& gains, Field<Pack>& x) {
     increment_down(tree_, constants_, work_.placement, work_.motion, gains, work_.innovation, work_.variation, x);
+  }
+  [[gnu::noinline]] void rates(const Gains<Pack>& gains, Field<Pack>& x) {
+    rate_down(tree_, constants_, work_.placement, gains, work_.innovation, work_.variation, x);
+  }
+  template <class Added>
+  [[gnu::noinline]] void find_articulated_inertias(const Added& added) {
+    articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, mass_gains(), added);
   }
   /// Residual and first half of a solve; of joints that are tied all of it, the correction in work_.increment. Returns the norm.
   Pack pass_up() {
@@ -337,12 +346,9 @@ class LaneSweeps {
 
   template <class Added>
   [[gnu::noinline]] void factor_mass(const Added& added) {
-    const auto factor = [&](const auto& all) {
-      articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, mass_gains(), all);
-    };
-    if (!tied()) return factor(added);
-    factor(factor_.fresh_ties().held(added));
-    tie([&](Field<Pack>& x) { rate_down(tree_, constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, x); });
+    if (!tied()) return find_articulated_inertias(added);
+    find_articulated_inertias(factor_.fresh_ties().held(added));
+    tie(&LaneSweeps::rates);
   }
   template <class Added>
   [[gnu::noinline]] void find_rate(const Added& added) {
@@ -352,11 +358,11 @@ class LaneSweeps {
     }
     const Gains<Pack> gains = mass_gains();
     mass_solve_up(tree_, constants_, work_.placement, p_, work_.articulated, gains.down, gains.inverse, work_.bias, work_.innovation, added);
-    rate_down(tree_, constants_, work_.placement, gains, work_.innovation, work_.variation, work_.increment);
+    rates(gains, work_.increment);
   }
   [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
-    impulse_pass_up(tree_, constants_, work_.placement, mass_gains(), right_side, work_.bias, work_.innovation);
-    rate_down(tree_, constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, rate);
+    impulses_up(mass_gains(), right_side);
+    rates(mass_gains(), rate);
     if (tied()) factor_.fresh_ties().complete(rate);
   }
   /// Followers to where their leaders are, without what rounding adds up to.

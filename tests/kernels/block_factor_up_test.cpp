@@ -15,11 +15,11 @@ const auto prepare = [](auto& rig) {
 };
 
 const auto first_order =
-    make_kernel(prepare, [](auto& rig) { block_factor_up<true>(rig.tree, rig.constants, rig.work, rig.gains()); },
+    make_kernel(prepare, [](auto& rig) { block_factor_up(rig.tree, rig.constants, rig.work, rig.gains(), Jacobian::first_order); },
                 {"gain_up", "gain_down", "joint_inverse"}, {}, {"articulated"});
 
 const auto exact =
-    make_kernel(prepare, [](auto& rig) { block_factor_up<false>(rig.tree, rig.constants, rig.work, rig.gains()); },
+    make_kernel(prepare, [](auto& rig) { block_factor_up(rig.tree, rig.constants, rig.work, rig.gains(), Jacobian::exact); },
                 {"gain_up", "gain_down", "joint_inverse"}, {}, {"articulated"});
 
 TEST_CASE("block_factor_up with the exact K leaves the gains of newton_factor_up") {
@@ -31,7 +31,7 @@ TEST_CASE("block_factor_up with the exact K leaves the gains of newton_factor_up
       Rig<double> expected = rig;
       factor_newton(expected);
       prepare(rig);
-      block_factor_up<false>(rig.tree, rig.constants, rig.work, rig.gains());
+      block_factor_up(rig.tree, rig.constants, rig.work, rig.gains(), Jacobian::exact);
       see(worst, relative_error(vector(rig.work.joint_inverse), vector(expected.work.joint_inverse)));
       for (Index k = 0; k < rig.tree.shape.velocities; ++k) {
         see(worst, relative_error(row<Wrench>(rig.work.gain_up, k), row<Wrench>(expected.work.gain_up, k)),
@@ -51,7 +51,7 @@ TEST_CASE("the gains to first order are off by the square of the turn") {
       Rig<double> expected = rig;
       factor_newton(expected);
       prepare(rig);
-      block_factor_up<true>(rig.tree, rig.constants, rig.work, rig.gains());
+      block_factor_up(rig.tree, rig.constants, rig.work, rig.gains(), Jacobian::first_order);
       INFO(model.names.model << ", turn " << turn);
       // the factor: masses here are spread over six decades
       CHECK(relative_error(vector(rig.work.joint_inverse), vector(expected.work.joint_inverse)) < 1e3 * turn * turn);

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "kernels/block/block_factor_up.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/displacement_down.hpp"
 #include "kernels/tree/increment_down.hpp"
@@ -169,7 +170,7 @@ void factor_newton(Rig<S>& rig, const Added& added = {}) {
     static_assert(std::is_same_v<Added, NothingAdded>);
     Rig<S> block = rig;
     start_down(block.tree, block.constants, block.work);
-    block_factor_up<false>(block.tree, block.constants, block.work, block.gains());
+    block_factor_up(block.tree, block.constants, block.work, block.gains(), Jacobian::exact);
     rig.work.gain_up = block.work.gain_up;
     rig.work.gain_down = block.work.gain_down;
     rig.work.joint_inverse = block.work.joint_inverse;

@@ -258,7 +258,7 @@ for (const [name, options] of [['light', { width: 1280, height: 800 }], ['dark',
   withLive(`a picture for people: ${name}`, [drop], options, async (page) => {
     await until(page, (now) => now.connected && now.seconds > 1.5);
     await page.evaluate(() => window.linden.layers({ forces: true }));
-    if (name === 'dark') await page.evaluate(() => window.linden.select('left_shin'));
+    if (name === 'dark') await page.evaluate(() => window.linden.select('left_shank'));
     await page.click('#servos-button');
     await picture(page, `live_${name}`);
     const box = await page.locator('#bar').boundingBox();
