@@ -253,8 +253,8 @@ TEST_CASE("instances that cannot be are refused though the checksum is right", "
   batch.step(4);
   const std::string good = batch.checkpoint();
   const std::size_t header = good.find('\n') + 1, first = header + 96, of_each = (good.size() - 8 - first) / 3;
-  const std::size_t record = 4 + 1 + 4 + 4 + 8 + 8 + 8;
-  REQUIRE(of_each == 8 * (2 + 2 + 2) + record);
+  const std::size_t record = 4 + 1 + 4 + 4 + 4 + 8 + 8 + 8, factor = 4 * (2 * 12 + 2) + 8 * 4;
+  REQUIRE(of_each == 8 * (2 + 2 + 2) + factor + record);
   const auto message_with = [&](std::size_t at, auto value) -> std::string {
     std::string bytes = good.substr(0, good.size() - 8);
     std::memcpy(bytes.data() + at, &value, sizeof(value));

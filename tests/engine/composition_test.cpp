@@ -382,14 +382,5 @@ TEST_CASE("a scene may name its order, and a tolerance that it does not name goe
   for (const int order : {2, 6, 8}) CHECK(options(fmt::format("order: {}\n", order)).reduction == 0);
 }
 
-TEST_CASE("a batch knows order 2 only and says so") {
-  Options options;
-  options.order = 4;
-  CHECK_THROWS_WITH(Batch(chain(3), 4, options), Catch::Contains("a batch has no order \"4\""));
-  options.order = 2;
-  options.reduction = 1e-5;
-  CHECK_THROWS_WITH(Batch(chain(3), 4, options), Catch::Contains("a batch has no reduction"));
-}
-
 }  // namespace
 }  // namespace linden

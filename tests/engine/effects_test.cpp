@@ -462,8 +462,7 @@ TEST_CASE("instances of a batch have joint friction of their own", "[effects][ba
   CHECK_THROWS_AS(simulation.set_friction(std::vector<double>{}), InputError);
 }
 
-TEST_CASE("what is an instance's own stays its own where it is stepped alone", "[effects][batch]") {
-  // a model with mimic joints is: every step of every instance
+TEST_CASE("what is an instance's own stays its own where joints are tied", "[effects][batch]") {
   const std::shared_ptr<const Model> hand = std::make_shared<const Model>(load_urdf(model_file("hand.urdf"), Base::fixed));
   Effects effects;
   effects.friction = {{.row = 0, .force = 0.1}};
@@ -478,7 +477,6 @@ TEST_CASE("what is an instance's own stays its own where it is stepped alone", "
   }
   constexpr int kSteps = 200;
   batch.step(kSteps);
-  CHECK(batch.summary().rescued == kSteps * batch.size());
   for (std::int64_t i = 0; i < batch.size(); ++i) {
     Simulation simulation(hand, options, effects);
     simulation.set_friction(std::vector<double>{friction(i)});

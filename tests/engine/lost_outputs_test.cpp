@@ -93,8 +93,8 @@ TEST_CASE("a full disk keeps the rows and frames that fit, and what goes to anot
 }
 
 TEST_CASE("checkpoints on a full disk give way to newer ones but for the last, and the rollout goes on", "[command line]") {
-  const std::string command = "rollout chain:30 --instances 200 --duration 0.1";
-  for (const auto& [size, room] : {std::pair<std::string, int>{"450k", 2}, {"250k", 1}, {"64k", 0}}) {  // a checkpoint takes 163 KB
+  const std::string command = "rollout chain:30 --instances 70 --duration 0.1";
+  for (const auto& [size, room] : {std::pair<std::string, int>{"450k", 2}, {"250k", 1}, {"64k", 0}}) {  // a checkpoint takes 168 KB
     INFO(size);
     const Shell shell;
     const Outcome outcome = on_full_disk(shell, size, command + " --keep 5 --checkpoint full/state --checkpoint-every 1e-9 --json a.json");

@@ -330,7 +330,7 @@ TEST_CASE("what was drawn acts where an instance is stepped alone, too", "[rando
   }
 }
 
-TEST_CASE("the ground has its drawn friction where an instance is stepped alone, too", "[randomization]") {
+TEST_CASE("the ground has its drawn friction where joints are tied, too", "[randomization]") {
   // two balanced wheels in a box that turn as one leave its motion as it is
   TreeBuilder builder("box with wheels");
   LinkSpec trunk;
@@ -356,7 +356,6 @@ TEST_CASE("the ground has its drawn friction where an instance is stepped alone,
   const std::vector<double> start = box.lying(slope);
   batch.reset_all([&](std::int64_t, std::span<double> q, std::span<double>) { std::ranges::copy(start, q.begin()); });
   batch.step(500);
-  CHECK(batch.summary().rescued == 500 * batch.size());
   for (std::int64_t i = 0; i < batch.size(); ++i) {
     const double friction = *draw(randomization, batch.model(), box.effects, static_cast<std::uint64_t>(i) + 1).ground_friction;
     CHECK(batch.positions()(i, 0) == Approx(0.125 * kG * (std::sin(slope) - friction * std::cos(slope))).margin(1e-3));

@@ -34,13 +34,14 @@ End after_steps(const Model& model, const Options& options, int steps, double sp
 }
 
 TEST_CASE("steps branch by branch are those of whole sweeps, to rounding") {
-  // which bodies are at the end of a stretch, and so go one by one, is another matter: compilers contract their products otherwise
+  // Which bodies are at the end of a stretch, and so go one by one, is another matter: compilers contract their products otherwise. Masses over
+  // six decades make 2e-11 of that where four bodies go at once, less where eight do.
   for (const Model& model : {balanced_tree(5000), random_tree({.bodies = 3000, .seed = 1}), humanoids(60), chain(2000)}) {
     INFO(model.names.model);
     REQUIRE_FALSE(model.tree.branches.empty());
     const End branches = after_steps(model, {.step = 1e-3}, 8), whole = after_steps(in_one_piece(model), {.step = 1e-3}, 8);
-    CHECK(distance(branches.positions, whole.positions) < 1e-11);
-    CHECK(distance(branches.velocities, whole.velocities) < 1e-8);
+    CHECK(distance(branches.positions, whole.positions) < 1e-10);
+    CHECK(distance(branches.velocities, whole.velocities) < 1e-7);
   }
 }
 
