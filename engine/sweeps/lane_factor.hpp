@@ -1,6 +1,6 @@
 // engine/sweeps/lane_factor.hpp
 // The factored Jacobian of a block of instances, held from step to step (engine/solve/held_factor.hpp). It is half of what a free step
-// computes, and a block whose motion is smooth makes one in some 16 steps.
+// computes; a tumbling humanoid makes one in some nine steps.
 //
 // Each lane goes by its own numbers: it makes a factor when its own is expected to serve no longer, whatever the lanes beside it do, so its
 // results are the same in any company. But a factor takes the same time for one lane as for all of them. So lanes agree on when to make one

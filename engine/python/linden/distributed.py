@@ -53,4 +53,4 @@ def threads(communicator: Any) -> int:
     all_cores = set().union(*machine.allgather(own))
     ranks = machine.Get_size()
     machine.Free()
-    return max(1, min(len(own), len(all_cores) // ranks))
+    return int(max(1, min(len(own), len(all_cores) // ranks)))
