@@ -77,7 +77,8 @@ for (const height of [640, 740]) {
     const { page } = opened;
     const check = async (least) => {
       const found = await page.evaluate(() => {
-        const boxes = [...document.querySelectorAll('#tools button, #bar button, #bar select, #bar input')].map((element) => {
+        const shown = [...document.querySelectorAll('#tools button, #bar button, #bar select, #bar input')].filter((element) => element.checkVisibility());
+        const boxes = shown.map((element) => {
           const { left, right, top, bottom } = element.getBoundingClientRect();
           return { id: element.id, left, right, top, bottom };
         });
