@@ -103,8 +103,8 @@ template <class Real>
 class BatchOf {
  public:
   /// Every instance at rest in the model's zero configuration. Throws InputError for options that make no sense or that a batch does not
-  /// have: it solves by Newton's method, starts from extrapolation and stops by energy; above order 2, for effects that cannot be taken back in
-  /// time. Here and below an instance or a body that there is
+  /// have: it solves by Newton's method, starts from extrapolation and stops by energy; and, above order 2, for effects that cannot be taken back
+  /// in time. Here and below an instance or a body that there is
   /// not, and a null pointer, are InputErrors too.
   BatchOf(Model model, std::int64_t size, const Options& options = {}, const Effects& effects = {}, const BatchOptions& computed = {});
   BatchOf(std::shared_ptr<const Model> model, std::int64_t size, const Options& options = {}, const Effects& effects = {},

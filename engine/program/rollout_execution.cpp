@@ -372,7 +372,8 @@ void RolloutExecution<Real>::gather_figures() {
   constexpr std::size_t kMostTexts = 5;
   constexpr char kEnd = '\0';
   const BatchSummary own = batch_.summary();
-  std::int64_t sums[] = {own.frozen, own.steps, own.evaluations, own.factors, own.rescued, batch_.threads(), static_cast<std::int64_t>(batch_.bytes())};
+  std::int64_t sums[] = {own.frozen, own.steps, own.evaluations, own.factors, own.rescued,
+                         batch_.threads(), static_cast<std::int64_t>(batch_.bytes())};
   ranks_.sum(sums);
   figures_.summary = {.frozen = sums[0], .steps = sums[1], .evaluations = sums[2], .factors = sums[3], .rescued = sums[4]};
   figures_.threads = static_cast<int>(sums[5]), figures_.bytes = static_cast<std::size_t>(sums[6]);

@@ -40,7 +40,7 @@ struct Policy {
   FloorTest floor_test = FloorTest::also_when_close;
   int may_grow = 0;           // the first so many corrections may leave a larger residual than they met
   int most_cuts = 0;          // times that one is cut in half; 0: none is ever taken back
-  bool refactors = false;     // the factor is made anew where it serves badly; else whoever sweeps has a rhythm for it
+  bool refactors = false;     // the factor is made anew where it serves badly; else whoever sweeps sees to it
   int one_state_at_a_time = kAnyNumber;  // from so many updates on: of what sticks too hard that alone which does most
   int one_limit_at_a_time = kAnyNumber;  // likewise of limits
   int first_continuation = kAnyNumber, last_continuation = kAnyNumber;  // after so many updates

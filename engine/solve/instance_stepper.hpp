@@ -31,7 +31,8 @@ class InstanceStepper {
   /// To set effects, and what they keep: to be written before a step and read after it.
   EffectControls controls() { return stepper_->controls(); }
 
-  /// One step of the state, from `time` on; after one that failed the state is no more what it was. The latest row of state().history and state().last_step say what is known of the step before.
+  /// One step of the state, from `time` on; after one that failed the state is no more what it was. The latest row of state().history and
+  /// state().last_step say what is known of the step before.
   StepReport step(double time);
   /// p = M(q) v.
   void set_velocities(std::span<const double> v);

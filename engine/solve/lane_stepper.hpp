@@ -28,7 +28,7 @@
 
 namespace linden {
 
-/// The factor is made anew by rhythm. With effects a residual may grow whenever states change, and states may take some corrections to settle.
+/// Sweeps make factors anew themselves. With effects a residual may grow whenever states change, and states may take some corrections to settle.
 inline constexpr Policy kSmoothBlock{.most_corrections = 8, .judges_guess = false, .floor_test = FloorTest::after_slow_correction, .may_grow = 1};
 inline constexpr Policy kBlockWithEffects{.most_corrections = 24,
                                           .floor_test = FloorTest::always,

@@ -14,10 +14,9 @@
 // source  the paper, Algorithm 2, lines 8 and 9; Featherstone, Rigid Body Dynamics Algorithms, 7.3
 #pragma once
 
-#include "kernels/block/evaluate_down.hpp"
 #include "kernels/tree/impulse_pass_up.hpp"
-#include "kernels/tree/newton_factor_up.hpp"
 #include "kernels/values/body_lanes.hpp"
+#include "layout/workspace.hpp"
 
 namespace linden {
 
