@@ -12,8 +12,9 @@
 //   read_velocity    mass_solve_up, rate_down         velocities of the momenta, where they are asked for
 //
 // A factor is held from step to step (lane_factor.hpp); effects that stick, stop or saturate want one of the step itself. It is made anew where
-// a correction left more than a hundredth or a state changed. Lanes that wait for others compute what they had; without effects what they
-// found is kept aside, which takes less.
+// a state changed, and exactly where a correction left more than a hundredth: to first order in turns it does not know how fast a body moves
+// along. What falls at tens of metres a second is stepped alone even so: the correction after a slow one is made before its factor is. Lanes
+// that wait for others compute what they had; without effects what they found is kept aside, which takes less.
 #pragma once
 
 #include <array>
@@ -148,7 +149,7 @@ class LaneSweeps {
       effects_.begin(block, step_, q_, work_);
       const Evaluation<Pack> moved = start_down(tree_, constants_, work_);
       if (!effects_->plan().ground.points.empty()) effects_->guess_points(work_.displacement);
-      now = evaluated(moved, due, Jacobian::first_order);
+      now = evaluated(moved, due, 0);
     } else {
       start_down(tree_, constants_, work_);
       if (due != 0) make_factor(due, Jacobian::first_order);
@@ -165,7 +166,7 @@ class LaneSweeps {
     const Mask mask = L::mask(corrected);
     const Evaluation<Pack> moved = tied() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
     const Pack before = norm_;
-    const Evaluated<Pack> now = evaluated(moved, (active & ~corrected) | (corrected & slow_), round % 4 == 0 ? Jacobian::exact : Jacobian::first_order);
+    const Evaluated<Pack> now = evaluated(moved, active & ~corrected, corrected & slow_);
     slow_ = (slow_ & ~corrected) | (corrected & ~L::bits(now.norm <= number(kWorn * kWorn) * before));
     if (round == 1) {
       factor_.first_correction(corrected, guess_norm_, now.norm, now.scale);
@@ -269,11 +270,12 @@ class LaneSweeps {
     return number(reduction_squared_) * min(guess, number(2 * kRoughGuess * kRoughGuess) * scale);
   }
 
-  /// The upward half, with a factor made anew in these lanes.
-  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes fresh, Jacobian jacobian) {
+  /// The upward half, with a factor made anew to first order in some lanes, exactly in others.
+  Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes first_order, Lanes exact) {
     Evaluated<Pack> now{.least_w = moved.least_w, .energy = moved.energy};
     if constexpr (kEffects) effects_.act(constants_, work_, now.energy);
-    if (fresh != 0) make_factor(fresh, jacobian);
+    if (first_order != 0) make_factor(first_order, Jacobian::first_order);
+    if (exact != 0) make_factor(exact, Jacobian::exact);
     now.norm = pass_up();
     now.scale = kEffects ? now.energy + fall() : now.energy;
     norm_ = now.norm;
