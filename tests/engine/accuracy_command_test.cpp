@@ -4,7 +4,7 @@
 
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::accuracy_command_test {
 namespace {
 
 nlohmann::json json_of(const std::filesystem::path& file) { return nlohmann::json::parse(text_of(file)); }
@@ -218,4 +218,4 @@ TEST_CASE("what a study of accuracy cannot be is refused in one line", "[command
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::accuracy_command_test

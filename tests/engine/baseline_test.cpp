@@ -8,7 +8,7 @@
 #include "tests/kernels/allocation_counter.hpp"
 #include "tests/reference/plain_scene.hpp"
 
-namespace linden {
+namespace linden::baseline_test {
 namespace {
 
 std::vector<double> end_of(const Model& model, Scheme scheme, double h, double duration, double spread,
@@ -126,4 +126,4 @@ TEST_CASE("what a baseline does not have is refused") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::baseline_test

@@ -13,7 +13,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::batch_checkpoint_test {
 namespace {
 
 constexpr std::int64_t kInstances = 11;  // no multiple of any number of lanes
@@ -278,4 +278,4 @@ TEST_CASE("instances that cannot be are refused though the checksum is right", "
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::batch_checkpoint_test

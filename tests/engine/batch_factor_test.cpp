@@ -9,7 +9,7 @@
 #include "models/urdf/urdf.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::batch_factor_test {
 namespace {
 
 Model humanoid() { return load_urdf(model_file("humanoid.urdf"), Base::floating); }
@@ -139,4 +139,4 @@ TEST_CASE("a batch that holds no factors keeps less of its instances") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::batch_factor_test

@@ -7,7 +7,7 @@
 #include "layout/support/input_error.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::batch_orders_test {
 namespace {
 
 Options options_of(int order, double step) {
@@ -151,4 +151,4 @@ TEST_CASE("what cannot be taken back in time is refused above order 2") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::batch_orders_test

@@ -11,7 +11,7 @@
 #include "models/shapes/contacts_of.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::batch_rows_test {
 namespace {
 
 /// A humanoid over the ground, with servos, one of them along a table, and joint friction.
@@ -268,4 +268,4 @@ TEST_CASE("many instances are reset at once as one by one, and none where one is
   together.reset(std::vector<std::int64_t>{}, {}, {});
 }
 
-}  // namespace linden
+}  // namespace linden::batch_rows_test

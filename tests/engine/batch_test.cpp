@@ -15,7 +15,7 @@
 #include "models/urdf/urdf.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::batch_test {
 namespace {
 
 using SharedModel = std::shared_ptr<const Model>;
@@ -463,4 +463,4 @@ TEST_CASE("an instance, a body or a row that there is not is refused wherever it
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::batch_test

@@ -10,7 +10,7 @@
 #include "scenes.hpp"
 #include "tests/reference/plain_scene.hpp"
 
-namespace linden {
+namespace linden::blows_test {
 namespace {
 
 /// `links` links of half a kilogram about y, 0.2 m apart.
@@ -283,4 +283,4 @@ TEST_CASE("instances of a batch bounce as simulations do", "[blows]") {
   }
 }
 
-}  // namespace linden
+}  // namespace linden::blows_test

@@ -9,7 +9,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::checkpoint_test {
 namespace {
 
 struct Setting {
@@ -147,4 +147,4 @@ TEST_CASE("a checkpoint that is damaged anywhere is refused and changes nothing"
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::checkpoint_test

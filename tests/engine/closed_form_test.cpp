@@ -5,7 +5,7 @@
 #include "tests/engine/scenes.hpp"
 #include "tests/reference/closed_forms.hpp"
 
-namespace linden {
+namespace linden::closed_form_test {
 namespace {
 
 /// Largest error over a motion, looked at `looks` times.
@@ -98,4 +98,4 @@ TEST_CASE("Lagrange's top nutates as its elliptic function says, to every order"
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::closed_form_test

@@ -16,8 +16,7 @@
 #define LINDEN_MODELS_DIR "models"
 #endif
 
-using namespace linden;
-
+namespace linden::command_line_test {
 namespace {
 
 const std::string kHumanoid = LINDEN_MODELS_DIR "/humanoid.urdf";
@@ -602,3 +601,5 @@ TEST_CASE("no two columns of a recording bear one name", "[command line]") {
   CHECK(csv.columns.size() == different.size());
   CHECK(csv.rows.at(0).size() == different.size());
 }
+
+}  // namespace linden::command_line_test

@@ -15,7 +15,7 @@
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"
 
-namespace linden {
+namespace linden::composition_test {
 namespace {
 
 constexpr int kHigher[] = {4, 6, 8};
@@ -383,4 +383,4 @@ TEST_CASE("a scene may name its order, and a tolerance that it does not name goe
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::composition_test

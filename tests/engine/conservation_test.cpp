@@ -4,7 +4,7 @@
 #include "engine/drift.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::conservation_test {
 namespace {
 
 double largest_energy_error(double h, double duration) {
@@ -74,4 +74,4 @@ TEST_CASE("momentum is kept to rounding whatever the solver's tolerance") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::conservation_test

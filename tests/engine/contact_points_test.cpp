@@ -8,7 +8,7 @@
 #include "models/shapes/contacts_of.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::contact_points_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -158,4 +158,4 @@ TEST_CASE("a joint between two bodies that stand carries the upper one", "[conta
   CHECK(eigen(reactions[1].force).norm() < 1e-5);
 }
 
-}  // namespace linden
+}  // namespace linden::contact_points_test

@@ -14,7 +14,7 @@
 #include "tests/engine/scenes.hpp"
 #include "tests/reference/plain_scene.hpp"
 
-namespace linden {
+namespace linden::dead_zone_spring_test {
 namespace {
 
 constexpr double kMass = 2, kStiffness = 500, kHalfWidth = 0.02, kRest = 0.1, kSpeed = 0.5;  // [kg, N/m, m, m, m/s]
@@ -161,4 +161,4 @@ TEST_CASE("a scene names it by joint, and hears what it left out", "[dead_zone_s
   CHECK_THROWS_WITH(scene_with("{stiffness: 3, half_with: 1}"), Contains("did you mean") && Contains("half_width"));
 }
 
-}  // namespace linden
+}  // namespace linden::dead_zone_spring_test

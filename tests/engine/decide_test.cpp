@@ -4,7 +4,7 @@
 #include <iterator>
 #include <ostream>
 
-namespace linden {
+namespace linden::decide_test {
 
 std::ostream& operator<<(std::ostream& out, Next next) {
   constexpr const char* names[kNexts] = {"accept", "correct", "refactor", "cut", "take back", "update states", "continuation", "give up"};
@@ -117,4 +117,4 @@ TEST_CASE("whatever is seen, a solve comes to an end") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::decide_test

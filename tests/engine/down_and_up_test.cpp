@@ -8,7 +8,7 @@
 
 #include "models/build/generators.hpp"
 
-namespace linden {
+namespace linden::down_and_up_test {
 namespace {
 
 std::vector<Model> trees() {
@@ -112,4 +112,4 @@ TEST_CASE("branches that share rows lie behind the trunk, each thread's apart fr
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::down_and_up_test

@@ -10,7 +10,7 @@
 #include "tests/layout/robots.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace linden {
+namespace linden::drawing_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -324,4 +324,4 @@ TEST_CASE("every robot at hand gives a drawing, whatever of its files is missing
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::drawing_test

@@ -11,7 +11,7 @@
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 
-namespace linden {
+namespace linden::effects_test {
 namespace {
 
 constexpr double kG = 9.81;
@@ -766,4 +766,4 @@ TEST_CASE("what the damping of servos takes is taken, not given", "[effects]") {
   CHECK(simulation.effect_work().taken() > 0.1 * before);
 }
 
-}  // namespace linden
+}  // namespace linden::effects_test

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-namespace linden {
+namespace linden::extrapolation_test {
 namespace {
 
 constexpr Index kRows = 3000;
@@ -77,4 +77,4 @@ TEST_CASE("a displacement that is remembered comes first, and the oldest is forg
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::extrapolation_test

@@ -10,7 +10,7 @@
 #include "tests/engine/drawn.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace linden {
+namespace linden::file_mesh_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -223,4 +223,4 @@ TEST_CASE("what a COLLADA file gets wrong about colours is no colour") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::file_mesh_test

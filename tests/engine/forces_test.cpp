@@ -10,7 +10,7 @@
 #include "models/build/random.hpp"
 #include "scenes.hpp"
 
-namespace linden {
+namespace linden::forces_test {
 namespace {
 
 Model one_joint(JointType type, double mass, double inertia, const Eigen::Vector3d& center = Eigen::Vector3d::Zero()) {
@@ -489,4 +489,4 @@ TEST_CASE("in single precision a push after an hour still gives its impulse", "[
   CHECK(batch.momenta()(0, 3) == Approx(2 + 2 * 0.0481).epsilon(1e-4));
 }
 
-}  // namespace linden
+}  // namespace linden::forces_test

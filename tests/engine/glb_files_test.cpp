@@ -9,7 +9,7 @@
 #include "tests/engine/glb_reader.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace linden {
+namespace linden::glb_files_test {
 namespace {
 
 TEST_CASE("glTF files of all robots and of hard cases are read") {
@@ -54,4 +54,4 @@ TEST_CASE("glTF files of all robots and of hard cases are read") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::glb_files_test

@@ -5,7 +5,7 @@
 #include "engine/view/gltf.hpp"
 #include "tests/engine/animations.hpp"
 
-namespace linden {
+namespace linden::gltf_refusals_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -80,4 +80,4 @@ TEST_CASE("a glTF file that would be too large is refused") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::gltf_refusals_test

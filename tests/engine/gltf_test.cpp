@@ -9,7 +9,7 @@
 #include "tests/engine/animations.hpp"
 #include "tests/engine/glb_reader.hpp"
 
-namespace linden {
+namespace linden::gltf_test {
 namespace {
 
 using Eigen::Affine3d;
@@ -327,4 +327,4 @@ TEST_CASE("normals of a glTF file have unit length, whatever those of the mesh h
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::gltf_test

@@ -12,7 +12,7 @@
 #include "models/build/random.hpp"
 #include "scenes.hpp"
 
-namespace linden {
+namespace linden::ground_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -426,4 +426,4 @@ TEST_CASE("a scene is told where its step does not resolve its ground, and what 
   CHECK(warnings("0.005", "{stiffness: 1e5, damping: 300}").empty());  // what bounces as little as that shows no difference
 }
 
-}  // namespace linden
+}  // namespace linden::ground_test

@@ -8,7 +8,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::held_factor_test {
 namespace {
 
 Model humanoid() { return load_urdf(model_file("humanoid.urdf"), Base::floating); }
@@ -193,4 +193,4 @@ TEST_CASE("a state that is set anew begins with a factor of its own") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::held_factor_test

@@ -8,7 +8,7 @@
 #include "layout/support/input_error.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::inspect_test {
 namespace {
 
 constexpr const char* kInertial =
@@ -118,4 +118,4 @@ TEST_CASE("a density that is none, or where none belongs, is refused with its pl
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::inspect_test

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <random>
 
-namespace linden {
+namespace linden::lane_counts_test {
 namespace {
 
 template <int W>
@@ -43,4 +43,4 @@ TEST_CASE("of a bit of many lanes those are found that have it as one of them ha
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::lane_counts_test

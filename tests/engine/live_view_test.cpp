@@ -5,7 +5,7 @@
 #include "engine/view/page_template.hpp"
 #include "tests/engine/live_client.hpp"
 
-namespace linden {
+namespace linden::live_view_test {
 namespace {
 
 const std::string kArm = LINDEN_MODELS_DIR "/scenes/arm_servo.yaml";
@@ -267,4 +267,4 @@ TEST_CASE("a live view that makes no sense is refused") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::live_view_test

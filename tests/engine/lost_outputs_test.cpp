@@ -9,7 +9,7 @@
 #include "tests/engine/array_reader.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::lost_outputs_test {
 namespace {
 
 /// Rows behind the header; every line is whole.
@@ -237,4 +237,4 @@ TEST_CASE("memory and threads that cannot be had are said in one line", "[comman
 #endif
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::lost_outputs_test

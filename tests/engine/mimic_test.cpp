@@ -8,7 +8,7 @@
 #include "models/build/builder.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::mimic_test {
 namespace {
 
 constexpr double kStep = 1e-3;
@@ -405,4 +405,4 @@ TEST_CASE("instances with massless followers, friction and limits move as a simu
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::mimic_test

@@ -13,7 +13,7 @@
 #include "tests/reference/plain_curve.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace linden {
+namespace linden::motion_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -285,4 +285,4 @@ TEST_CASE("Slopes that are given make the curve of a smooth motion exact to four
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::motion_test

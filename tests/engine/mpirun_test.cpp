@@ -7,7 +7,7 @@
 #include "tests/engine/array_reader.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::mpirun_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -209,5 +209,5 @@ TEST_CASE("ranks that are killed while they write leave what was there before, a
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::mpirun_test
 #endif

@@ -14,7 +14,7 @@
 #include "models/shapes/contacts_of.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::observations_test {
 namespace {
 
 using Numbers = std::vector<double>;
@@ -298,4 +298,4 @@ TEST_CASE("names that are not known, and room that does not fit, are told with w
   CHECK_THROWS_WITH(seen.observe(other, room), Catch::Contains("another model"));
 }
 
-}  // namespace linden
+}  // namespace linden::observations_test

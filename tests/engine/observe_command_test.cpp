@@ -14,7 +14,7 @@
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::observe_command_test {
 namespace {
 
 std::vector<double> doubles_of(const Array& array) {
@@ -132,4 +132,4 @@ TEST_CASE("observations that there are not are refused in one line, with the nea
   check_refused(shell, "run " + kArm + " --order 4 --record a.npz --observe imu:link_7", "expected order 2");
 }
 
-}  // namespace linden
+}  // namespace linden::observe_command_test

@@ -3,7 +3,7 @@
 
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::order_test {
 namespace {
 
 std::vector<double> end_of(const Model& model, double h, double duration, double spread) {
@@ -57,4 +57,4 @@ TEST_CASE("a run taken back with flipped momenta returns to where it began, to r
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::order_test

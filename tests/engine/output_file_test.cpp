@@ -19,7 +19,7 @@ std::function<int(int file)> on_fsync;  // in place of the system's
 // stands before the one of the C library in this program
 extern "C" int fsync(int file) { return on_fsync ? on_fsync(file) : static_cast<int>(::syscall(SYS_fsync, file)); }
 
-namespace linden {
+namespace linden::output_file_test {
 namespace {
 
 /// While it lives, on_fsync.
@@ -66,4 +66,4 @@ TEST_CASE("an output that does not reach the disk leaves the old file and nothin
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::output_file_test

@@ -9,7 +9,7 @@
 #include "tests/engine/busy_scene.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::own_gravity_test {
 namespace {
 
 using Gravity = std::array<double, 3>;
@@ -155,4 +155,4 @@ TEST_CASE("rows of servos and of friction are called as their joints", "[batch]"
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::own_gravity_test

@@ -20,7 +20,7 @@
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 
-namespace linden {
+namespace linden::page_test {
 namespace {
 
 /// The data of a page, read by the specification alone.
@@ -279,4 +279,4 @@ TEST_CASE("frames are those that were asked for, or as many as can be shown, whi
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::page_test

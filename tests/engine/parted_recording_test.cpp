@@ -10,7 +10,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/engine/turns.hpp"
 
-namespace linden {
+namespace linden::parted_recording_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -231,4 +231,4 @@ TEST_CASE("what is no .h5 cannot be in parts, and what cannot be written is told
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::parted_recording_test

@@ -6,7 +6,7 @@
 #include "engine/drift.hpp"
 #include "scenes.hpp"
 
-namespace linden {
+namespace linden::passive_watch_test {
 namespace {
 
 EffectAccount step(double friction, double ground, double kinetic = 1) {
@@ -91,4 +91,4 @@ TEST_CASE("what went to and fro is not only kinetic energy") {
   CHECK(drift.first_change() == 0);
 }
 
-}  // namespace linden
+}  // namespace linden::passive_watch_test

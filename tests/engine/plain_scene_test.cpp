@@ -13,7 +13,7 @@
 #include "tests/reference/coriolis_plain.hpp"
 #include "tests/reference/plain_scene.hpp"
 
-namespace linden {
+namespace linden::plain_scene_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -322,4 +322,4 @@ TEST_CASE("drag slows a body in wind to the wind's speed", "[plain]") {
   CHECK(scene.v[3] == Approx(3 * (1 - std::exp(-1))).epsilon(1e-8));
 }
 
-}  // namespace linden
+}  // namespace linden::plain_scene_test

@@ -12,7 +12,7 @@
 #include "engine/program/plot_scale.hpp"
 #include "tests/engine/folder.hpp"
 
-namespace linden {
+namespace linden::plot_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -144,4 +144,4 @@ TEST_CASE("what cannot be drawn is refused with the reason, and no file appears"
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::plot_test

@@ -6,7 +6,7 @@
 
 #include "engine/program/power_law.hpp"
 
-namespace linden {
+namespace linden::power_law_test {
 namespace {
 
 const std::vector<double> kSizes{10, 20, 50, 100, 200, 500, 1000};
@@ -68,4 +68,4 @@ TEST_CASE("costs that are unknown are left out, and too few points have no expon
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::power_law_test

@@ -8,7 +8,7 @@
 #include "engine/scene/scene_file.hpp"
 #include "models/urdf/urdf.hpp"
 
-namespace linden {
+namespace linden::pull_test {
 namespace {
 
 const std::string kModels = LINDEN_MODELS_DIR;
@@ -129,4 +129,4 @@ TEST_CASE("a pull from far away is no stronger than ten weights") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::pull_test

@@ -18,7 +18,7 @@
 #include "tests/reference/coriolis_plain.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::queries_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -436,4 +436,4 @@ TEST_CASE("questions that make no sense say what was found and what was expected
   CHECK_THROWS_WITH(composed.accelerations(), Catch::Contains("order 4") && Catch::Contains("expected order 2"));
 }
 
-}  // namespace linden
+}  // namespace linden::queries_test

@@ -17,7 +17,7 @@
 #include "models/build/builder.hpp"
 #include "scenes.hpp"
 
-namespace linden {
+namespace linden::randomization_test {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -548,4 +548,4 @@ TEST_CASE("a scene that randomises what it has not, or by no range, is refused w
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::randomization_test

@@ -8,7 +8,7 @@
 #include "tests/engine/array_reader.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::randomize_command_test {
 namespace {
 
 const std::string kScene =
@@ -158,4 +158,4 @@ TEST_CASE("what cannot be randomised is refused in one line", "[command line][ra
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::randomize_command_test

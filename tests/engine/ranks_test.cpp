@@ -11,7 +11,7 @@
 #include "layout/support/input_error.hpp"
 #include "tests/engine/turns.hpp"
 
-namespace linden {
+namespace linden::ranks_test {
 namespace {
 
 TEST_CASE("every instance belongs to one rank, neighbours lie together and no rank has two more than another") {
@@ -175,4 +175,4 @@ TEST_CASE("work that fails at some ranks ends at all with one message and one ex
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::ranks_test

@@ -12,7 +12,7 @@
 #include "models/build/generators.hpp"
 #include "tests/engine/folder.hpp"
 
-namespace linden {
+namespace linden::recorded_arrays_test {
 namespace {
 
 void write(const std::string& file, const Names& names, std::int64_t instances) {
@@ -109,4 +109,4 @@ TEST_CASE("a recording that is cut or changed is read or refused, and never more
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::recorded_arrays_test

@@ -10,7 +10,7 @@
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::recording_test {
 namespace {
 
 // ---- forces of a step
@@ -359,4 +359,4 @@ TEST_CASE("what there is not is refused with what there is", "[command line]") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::recording_test

@@ -7,7 +7,7 @@
 #include "models/build/generators.hpp"
 #include "scenes.hpp"
 
-namespace linden {
+namespace linden::rest_test {
 namespace {
 
 /// A chain of `links` links of `mass`, hinged about y, that hang from the origin.
@@ -194,4 +194,4 @@ TEST_CASE("a motion under friction, dampers and servos reads the velocity of its
   }
 }
 
-}  // namespace linden
+}  // namespace linden::rest_test

@@ -8,7 +8,7 @@
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/traced.hpp"
 
-namespace linden {
+namespace linden::rollout_checkpoint_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -281,4 +281,4 @@ TEST_CASE("where a recording goes on it is the one that was begun, in parts that
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::rollout_checkpoint_test

@@ -4,7 +4,7 @@
 #include "engine/batch.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::rollout_command_test {
 namespace {
 
 const std::string kArm = LINDEN_MODELS_DIR "/arm.urdf";
@@ -149,4 +149,4 @@ TEST_CASE("what a rollout cannot be is refused in one line", "[command line]") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::rollout_command_test

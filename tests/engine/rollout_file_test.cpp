@@ -26,7 +26,7 @@
 #include "tests/engine/array_reader.hpp"
 #include "tests/engine/folder.hpp"
 
-namespace linden {
+namespace linden::rollout_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -431,4 +431,4 @@ TEMPLATE_TEST_CASE("Python opens a rollout in one line", "", float, double) {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::rollout_file_test

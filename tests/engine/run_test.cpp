@@ -3,7 +3,7 @@
 
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::run_test {
 namespace {
 
 struct Case {
@@ -161,4 +161,4 @@ TEST_CASE("splits in a row are counted across runs, however they are cut") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::run_test

@@ -4,7 +4,7 @@
 
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::scaling_command_test {
 namespace {
 
 nlohmann::json json_of(const std::filesystem::path& file) { return nlohmann::json::parse(text_of(file)); }
@@ -140,4 +140,4 @@ TEST_CASE("what a scaling cannot be is refused in one line", "[command line]") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::scaling_command_test

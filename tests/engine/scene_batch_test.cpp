@@ -8,7 +8,7 @@
 #include "layout/support/input_error.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::scene_batch_test {
 namespace {
 
 /// A hand-sized chain that hangs bent, turns, is held by a servo and rubs in one joint.
@@ -106,4 +106,4 @@ TEST_CASE("a batch refuses scenes that a simulation refuses, and those that only
   CHECK_THROWS_WITH(Batch(bent_chain(), 0), Catch::Contains("0 instances"));
 }
 
-}  // namespace linden
+}  // namespace linden::scene_batch_test

@@ -10,7 +10,7 @@
 #include "tests/engine/busy_scene.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::scene_bytes_test {
 namespace {
 
 std::vector<Model> models() {
@@ -154,4 +154,4 @@ TEST_CASE("bytes whose checksum was made to agree are a scene that can be simula
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::scene_bytes_test

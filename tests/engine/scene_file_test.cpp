@@ -14,8 +14,7 @@
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/scenes.hpp"
 
-using namespace linden;
-
+namespace linden::scene_file_test {
 namespace {
 
 const std::string kScenes = LINDEN_MODELS_DIR "/scenes/";
@@ -1006,3 +1005,5 @@ TEST_CASE("scenes that cannot be run are refused in one line", "[scene][command 
   check_refused(shell, "rollout a.yaml --base floating", "leave --base out");
   check_refused(shell, "run a.yaml --spread -1", "--spread");
 }
+
+}  // namespace linden::scene_file_test

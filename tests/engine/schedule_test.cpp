@@ -14,7 +14,7 @@
 #include "tests/engine/schedule_stepper.hpp"
 #include "tests/kernels/allocation_counter.hpp"
 
-namespace linden {
+namespace linden::schedule_test {
 namespace {
 
 std::multiset<std::string> names_of(const std::vector<Sweep>& sweeps) {
@@ -342,4 +342,4 @@ TEST_CASE("every sweep of a schedule is measured") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::schedule_test

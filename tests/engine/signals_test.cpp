@@ -11,7 +11,7 @@
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/traced.hpp"
 
-namespace linden {
+namespace linden::signals_test {
 namespace {
 
 constexpr std::int64_t kSteps = 4000, kFrames = 300;
@@ -206,4 +206,4 @@ TEST_CASE("a second Ctrl-C does not cut off the packing, which may take long, an
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::signals_test

@@ -7,7 +7,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::simulation_test {
 namespace {
 
 TEST_CASE("velocities come back as they were given") {
@@ -193,4 +193,4 @@ TEST_CASE("setting positions keeps the velocities") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::simulation_test

@@ -5,7 +5,7 @@
 #include "tests/engine/scenes.hpp"
 #include "tests/kernels/allocation_counter.hpp"
 
-namespace linden {
+namespace linden::solver_test {
 namespace {
 
 double mean_iterations(Index links, int steps) {
@@ -168,4 +168,4 @@ TEST_CASE("options that make no sense are refused") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::solver_test

@@ -6,7 +6,7 @@
 #include "engine/compose/composition.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::stage_guess_test {
 namespace {
 
 /// A motion whose displacement in each sub-step is its length times a polynomial in the time of its middle.
@@ -77,4 +77,4 @@ TEST_CASE("a sub-step that was forgotten is guessed from its own past alone unti
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::stage_guess_test

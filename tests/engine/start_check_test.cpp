@@ -12,7 +12,7 @@
 #include "models/shapes/contacts_of.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::start_check_test {
 namespace {
 
 /// Two hinges, one below the other, and one that follows the first: q = -2 q_first + 0.1.
@@ -245,4 +245,4 @@ TEST_CASE("a rollout tells how many of its instances random joints put in the gr
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::start_check_test

@@ -10,7 +10,7 @@
 #include "tests/engine/command_line.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::tasks_test {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
@@ -157,4 +157,4 @@ TEST_CASE("a rope hangs from a point that moves", "[task]") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::tasks_test

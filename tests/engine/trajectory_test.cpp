@@ -3,7 +3,7 @@
 #include "tests/reference/del_literal.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::trajectory_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -65,4 +65,4 @@ TEST_CASE("the discrete action is stationary along trajectories of every robot, 
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::trajectory_test

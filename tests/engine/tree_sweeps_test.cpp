@@ -11,7 +11,7 @@
 #include "kernels/values/joints.hpp"
 #include "tests/engine/scenes.hpp"
 
-namespace linden {
+namespace linden::tree_sweeps_test {
 namespace {
 
 /// The same bodies in the same slots, gone through level by level to the end and back.
@@ -149,4 +149,4 @@ TEST_CASE("the order of bodies does not matter to their motion but for rounding"
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::tree_sweeps_test

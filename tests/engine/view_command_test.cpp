@@ -4,7 +4,7 @@
 #include "engine/view/page_template.hpp"
 #include "tests/engine/command_line.hpp"
 
-namespace linden {
+namespace linden::view_command_test {
 namespace {
 
 const std::string kHumanoid = LINDEN_MODELS_DIR "/humanoid.urdf";
@@ -121,4 +121,4 @@ TEST_CASE("a browser that is none leaves no picture, and says so") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::view_command_test

@@ -15,8 +15,6 @@
 namespace linden {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
 void long_chain(Report& report) {
   const auto steps = report.pick<std::int64_t>(10'000, 100'000, 1'000'000);
   Scenario falling = scenario(chain(10), {.step = 1e-3}, steps);

@@ -11,8 +11,6 @@
 namespace linden {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
 using Quaternion = Eigen::Map<const Eigen::Vector4d>;
 
 /// First row of the quaternion of body `slot`.

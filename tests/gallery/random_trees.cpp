@@ -11,7 +11,6 @@
 namespace linden {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kSpread = 0.5;  // of the start
 constexpr double kLost = 1e-6;   // of velocities: beyond it a step may be refused
 

@@ -10,7 +10,6 @@
 namespace linden {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kTolerance = 1e-14;  // of the solves: what each step may be off
 
 /// Where a scenario leads, and how nearby motions part from it: what rounding may do to it.

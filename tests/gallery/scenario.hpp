@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +26,8 @@
 #include "tests/gallery/report.hpp"
 
 namespace linden {
+
+inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 struct Scenario {
   std::shared_ptr<const Model> model;

@@ -13,7 +13,6 @@
 namespace linden {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kPi = std::numbers::pi;
 
 /// Angle of a unit quaternion about z, from -pi to pi, with full relative accuracy near zero.

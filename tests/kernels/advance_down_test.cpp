@@ -5,7 +5,7 @@
 #include "kernels/tree/innovation_up.hpp"
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::advance_down_test {
 namespace {
 
 template <class S>
@@ -121,4 +121,4 @@ TEST_CASE("the sweeps at the end of a step give equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::advance_down_test

@@ -5,7 +5,7 @@
 #include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::advance_map_test {
 namespace {
 
 const auto kernel =
@@ -104,4 +104,4 @@ TEST_CASE("advance_map allocates nothing") { check_allocates_nothing(kernel); }
 TEST_CASE("advance_map gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::advance_map_test

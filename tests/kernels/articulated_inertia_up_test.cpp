@@ -8,7 +8,7 @@
 #include "tests/reference/elimination_plain.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::articulated_inertia_up_test {
 namespace {
 
 const auto kernel = make_kernel([](auto& rig) { place(rig); },
@@ -116,4 +116,4 @@ TEST_CASE("articulated_inertia_up allocates nothing") { check_allocates_nothing(
 TEST_CASE("articulated_inertia_up gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::articulated_inertia_up_test

@@ -5,7 +5,7 @@
 #include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::articulated_test {
 namespace {
 
 using Matrix6 = reference::Matrix6<double>;
@@ -154,4 +154,4 @@ TEST_CASE("eliminating joints writes every gain, allocates nothing and gives equ
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::articulated_test

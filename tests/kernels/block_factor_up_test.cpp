@@ -4,7 +4,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::block_factor_up_test {
 namespace {
 
 /// Displacements of the step; no gains yet.
@@ -76,4 +76,4 @@ TEST_CASE("block_factor_up gives equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::block_factor_up_test

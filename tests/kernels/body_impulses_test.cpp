@@ -7,7 +7,7 @@
 #include "kernels/effects/drag.hpp"
 #include "kernels/effects/wrench.hpp"
 
-namespace linden {
+namespace linden::body_impulses_test {
 namespace {
 
 constexpr double kStep = 1e-3;
@@ -90,4 +90,4 @@ TEST_CASE("forces of both ends are one wrench in space") {
   CHECK((numbers - begin).norm() < 1e-15);
 }
 
-}  // namespace linden
+}  // namespace linden::body_impulses_test

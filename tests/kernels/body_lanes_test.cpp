@@ -4,7 +4,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::body_lanes_test {
 namespace {
 
 /// Every number of a field its own.
@@ -110,4 +110,4 @@ TEST_CASE("a scan meets every body once, in order, and several at once only wher
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::body_lanes_test

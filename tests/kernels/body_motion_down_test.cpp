@@ -5,7 +5,7 @@
 #include "tests/kernels/query_rig.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::body_motion_down_test {
 namespace {
 
 TEST_CASE("bodies are placed, move and accelerate as the plain tree's Jacobians and their derivatives say") {
@@ -66,4 +66,4 @@ TEST_CASE("body_motion_down writes what its depth says, allocates nothing and is
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::body_motion_down_test

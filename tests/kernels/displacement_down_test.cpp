@@ -4,7 +4,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::displacement_down_test {
 namespace {
 
 const auto kernel = make_kernel([](auto& rig) { place(rig); },
@@ -160,4 +160,4 @@ TEST_CASE("displacement_down allocates nothing") { check_allocates_nothing(kerne
 TEST_CASE("displacement_down gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::displacement_down_test

@@ -5,7 +5,7 @@
 #include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::evaluate_down_test {
 namespace {
 
 const auto start = make_kernel(
@@ -152,4 +152,4 @@ TEST_CASE("start_down and correct_down give equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::evaluate_down_test

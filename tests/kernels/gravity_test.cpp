@@ -6,7 +6,7 @@
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::gravity_test {
 namespace {
 
 const Eigen::Vector3d kGravity(1.5, -2, -9.81);
@@ -115,4 +115,4 @@ TEST_CASE("the sweeps of gravity give equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::gravity_test

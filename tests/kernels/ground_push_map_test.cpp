@@ -4,7 +4,7 @@
 
 #include "tests/kernels/lanes.hpp"
 
-namespace linden {
+namespace linden::ground_push_map_test {
 namespace {
 
 constexpr double kStiffness = 1000, kDamping = 20;
@@ -73,4 +73,4 @@ TEST_CASE("ground_push_map gives each lane its own") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::ground_push_map_test

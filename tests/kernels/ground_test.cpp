@@ -9,7 +9,7 @@
 
 #include "tests/kernels/lanes.hpp"
 
-namespace linden {
+namespace linden::ground_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -548,4 +548,4 @@ TEST_CASE("every lane gets what its own pose calls for, with the same bits in an
   }
 }
 
-}  // namespace linden
+}  // namespace linden::ground_test

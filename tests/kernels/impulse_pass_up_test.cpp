@@ -8,7 +8,7 @@
 #include "tests/reference/elimination_plain.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::impulse_pass_up_test {
 namespace {
 
 const auto kernel = make_kernel([](auto& rig) { factor_newton(rig); }, [](auto& rig) { pass_up(rig, rig.right_side); },
@@ -88,4 +88,4 @@ TEST_CASE("impulse_pass_up allocates nothing") { check_allocates_nothing(kernel)
 TEST_CASE("impulse_pass_up gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::impulse_pass_up_test

@@ -4,7 +4,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::impulse_up_test {
 namespace {
 
 const auto kernel = make_kernel(
@@ -80,4 +80,4 @@ TEST_CASE("impulse_up allocates nothing") { check_allocates_nothing(kernel); }
 TEST_CASE("impulse_up gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::impulse_up_test

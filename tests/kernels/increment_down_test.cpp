@@ -7,7 +7,7 @@
 #include "tests/reference/dense_jacobian.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::increment_down_test {
 namespace {
 
 const auto newton = make_kernel(
@@ -124,4 +124,4 @@ TEST_CASE("the downward passes give equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::increment_down_test

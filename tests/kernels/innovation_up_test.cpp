@@ -5,7 +5,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::innovation_up_test {
 namespace {
 
 /// Momenta and displacements of the step, gains of the exact Jacobian, and what innovation_up is to find h mu in.
@@ -84,4 +84,4 @@ TEST_CASE("innovation_up gives equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::innovation_up_test

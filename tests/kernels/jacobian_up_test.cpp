@@ -5,7 +5,7 @@
 #include "tests/kernels/query_rig.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::jacobian_up_test {
 namespace {
 
 const auto last_body = [](auto& rig) {
@@ -42,4 +42,4 @@ TEST_CASE("jacobian_up writes all it is to write, allocates nothing and is the s
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::jacobian_up_test

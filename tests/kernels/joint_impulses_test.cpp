@@ -17,7 +17,7 @@
 #include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 
-namespace linden {
+namespace linden::joint_impulses_test {
 namespace {
 
 constexpr double kStep = 2e-3, kPosition = 0.3, kBefore = 4e-3;
@@ -428,4 +428,4 @@ TEST_CASE("joint effects treat all lanes alike and allocate nothing") {
   check_value_lanes<5>(force, samples, 1e-14);
 }
 
-}  // namespace linden
+}  // namespace linden::joint_impulses_test

@@ -5,7 +5,7 @@
 #include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::joints_test {
 namespace {
 
 TEST_CASE("down meets every slot but the world once, in order, each with its kind") {
@@ -117,4 +117,4 @@ TEST_CASE("what joints add and take has equal bits in every lane, and nothing al
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::joints_test

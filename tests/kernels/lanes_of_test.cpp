@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <xsimd/xsimd.hpp>
 
-namespace linden {
+namespace linden::lanes_of_test {
 namespace {
 
 template <class S>
@@ -31,4 +31,4 @@ TEST_CASE("lanes as bits, and as a mask of a register, are the same lanes") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::lanes_of_test

@@ -5,7 +5,7 @@
 #include "tests/kernels/query_rig.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::mass_matrix_up_test {
 namespace {
 
 const auto mass = [](auto& rig) { mass_matrix_up(rig.tree, rig.constants, rig.motions.placement, rig.composite, rig.mass_matrix.row(0)); };
@@ -66,4 +66,4 @@ TEST_CASE("the sweeps of the mass matrix write all they are to write, allocate n
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::mass_matrix_up_test

@@ -6,7 +6,7 @@
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::mass_solve_up_test {
 namespace {
 
 const auto run = [](auto& rig, const auto& added) {
@@ -72,4 +72,4 @@ TEST_CASE("mass_solve_up allocates nothing") { check_allocates_nothing(kernel); 
 TEST_CASE("mass_solve_up gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::mass_solve_up_test

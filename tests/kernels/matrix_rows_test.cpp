@@ -4,7 +4,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::matrix_rows_test {
 namespace {
 
 // Rows in registers of every width, whatever this processor has.
@@ -69,4 +69,4 @@ TEMPLATE_TEST_CASE_SIG("rows and the blocks of a Mat6 are the same matrix", "", 
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::matrix_rows_test

@@ -7,7 +7,7 @@
 #include "tests/reference/dense_jacobian.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::mimic_test {
 namespace {
 
 /// Ties `count` screws, drawn at random, to other screws; a leader may have several followers, followers lead nobody.
@@ -319,4 +319,4 @@ TEST_CASE("a tied solve gives equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::mimic_test

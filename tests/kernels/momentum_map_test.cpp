@@ -6,7 +6,7 @@
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::momentum_map_test {
 namespace {
 
 const auto kernel = make_kernel([](auto& rig) { displace(rig); },
@@ -89,4 +89,4 @@ TEST_CASE("momentum_map gives equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::momentum_map_test

@@ -6,7 +6,7 @@
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::momentum_update_map_test {
 namespace {
 
 const auto target = make_kernel(
@@ -220,4 +220,4 @@ TEST_CASE("the momentum maps at the ends of a step give equal bits in every lane
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::momentum_update_map_test

@@ -4,7 +4,7 @@
 
 #include "tests/kernels/query_rig.hpp"
 
-namespace linden {
+namespace linden::motion_between_map_test {
 namespace {
 
 const auto between = [](auto& rig) { motion_between_map(rig.tree, rig.constants, rig.q, rig.q_next, rig.motion); };
@@ -39,4 +39,4 @@ TEST_CASE("motion_between_map writes all it is to write, allocates nothing and i
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::motion_between_map_test

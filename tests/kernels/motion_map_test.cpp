@@ -4,7 +4,7 @@
 
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::motion_map_test {
 namespace {
 
 const auto motion = make_kernel(
@@ -136,4 +136,4 @@ TEST_CASE("the motion maps give equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::motion_map_test

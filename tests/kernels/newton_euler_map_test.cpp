@@ -7,7 +7,7 @@
 #include "tests/reference/coriolis_plain.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::newton_euler_map_test {
 namespace {
 
 const auto wrenches = [](auto& rig) {
@@ -47,4 +47,4 @@ TEST_CASE("newton_euler_map writes all it is to write, allocates nothing and is 
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::newton_euler_map_test

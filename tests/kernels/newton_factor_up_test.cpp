@@ -8,12 +8,12 @@
 #include "tests/reference/dense_jacobian_plain.hpp"
 #include "tests/reference/elimination_plain.hpp"
 
-namespace linden {
+namespace linden::newton_factor_up_test {
 namespace {
 
 const auto kernel =
     make_kernel([](auto& rig) { find_momenta(rig); },
-                [](auto& rig) {
+                [](Rig<double>& rig) {
                   newton_factor_up(rig.tree, rig.constants, rig.work.placement, rig.work.motion, rig.work.displacement, rig.work.articulated, rig.gains());
                 },
                 {"gain_up", "gain_down", "joint_inverse"}, {}, {"articulated"});
@@ -192,7 +192,5 @@ TEST_CASE("newton_factor_up writes all it is to write and nothing else") {
 
 TEST_CASE("newton_factor_up allocates nothing") { check_allocates_nothing_as<double>(kernel); }
 
-
-
 }  // namespace
-}  // namespace linden
+}  // namespace linden::newton_factor_up_test

@@ -5,7 +5,7 @@
 #include "models/build/builder.hpp"
 #include "tests/kernels/rig.hpp"
 
-namespace linden {
+namespace linden::placement_map_test {
 namespace {
 
 const auto kernel = make_kernel(
@@ -55,4 +55,4 @@ TEST_CASE("placement_map allocates nothing") { check_allocates_nothing(kernel); 
 TEST_CASE("placement_map gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::placement_map_test

@@ -7,7 +7,7 @@
 #include "tests/kernels/lanes.hpp"
 #include "tests/reference/se3_plain.hpp"
 
-namespace linden {
+namespace linden::polynomial_test {
 namespace {
 
 using std::numbers::pi;
@@ -161,4 +161,4 @@ TEST_CASE("polynomials give equal bits in every lane and allocate nothing") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::polynomial_test

@@ -6,7 +6,7 @@
 #include "tests/kernels/lanes.hpp"
 #include "tests/kernels/values.hpp"
 
-namespace linden {
+namespace linden::quaternion_of_test {
 namespace {
 
 const auto quaternion = [](const auto& numbers) {
@@ -55,4 +55,4 @@ TEST_CASE("the quaternion of a small turn keeps its digits") {
 TEST_CASE("quaternion_of gives equal bits in every lane") { check_value_lanes(quaternion, turns(), 1e-15); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::quaternion_of_test

@@ -7,7 +7,7 @@
 #include "tests/reference/del_literal.hpp"
 #include "tests/reference/discrete_action_plain.hpp"
 
-namespace linden {
+namespace linden::residual_up_test {
 namespace {
 
 const auto kernel = make_kernel(
@@ -124,4 +124,4 @@ TEST_CASE("residual_up allocates nothing") { check_allocates_nothing(kernel); }
 TEST_CASE("residual_up gives equal bits in every lane") { check_lanes(kernel); }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::residual_up_test

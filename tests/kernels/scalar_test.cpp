@@ -6,7 +6,7 @@
 #include "tests/kernels/lanes.hpp"
 #include "tests/reference/dual.hpp"
 
-namespace linden {
+namespace linden::scalar_test {
 namespace {
 
 TEST_CASE("a constant keeps its value as a double and is rounded to nearest as a float") {
@@ -54,4 +54,4 @@ TEST_CASE("dual numbers differentiate") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::scalar_test

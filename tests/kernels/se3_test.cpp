@@ -7,7 +7,7 @@
 #include "tests/kernels/lanes.hpp"
 #include "tests/kernels/values.hpp"
 
-namespace linden {
+namespace linden::se3_test {
 namespace {
 
 using reference::Dual;
@@ -343,4 +343,4 @@ TEST_CASE("exp, log, dlog and pose_derivative give equal bits in every lane and 
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::se3_test

@@ -6,7 +6,7 @@
 #include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 
-namespace linden {
+namespace linden::sincos_test {
 namespace {
 
 /// Largest absolute error of both, in epsilons of S, over angles up to `top`.
@@ -62,4 +62,4 @@ TEST_CASE("sine and cosine give equal bits in every lane, whatever the angles be
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::sincos_test

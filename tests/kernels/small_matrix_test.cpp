@@ -6,7 +6,7 @@
 #include "models/build/random.hpp"
 #include "tests/kernels/lanes.hpp"
 
-namespace linden {
+namespace linden::small_matrix_test {
 namespace {
 
 template <std::size_t N>
@@ -76,4 +76,4 @@ TEST_CASE("invert gives equal bits in every lane and allocates nothing") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::small_matrix_test

@@ -5,7 +5,7 @@
 #include "tests/kernels/lanes.hpp"
 #include "tests/kernels/values.hpp"
 
-namespace linden {
+namespace linden::spatial_test {
 namespace {
 
 using reference::adjoint;
@@ -176,4 +176,4 @@ TEST_CASE("spatial operations give equal bits in every lane and allocate nothing
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::spatial_test

@@ -5,7 +5,7 @@
 #include "tests/kernels/query_rig.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-namespace linden {
+namespace linden::total_momentum_map_test {
 namespace {
 
 const auto add_up = [](auto& rig) {
@@ -43,4 +43,4 @@ TEST_CASE("total_momentum_map writes all it is to write, allocates nothing and i
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::total_momentum_map_test

@@ -6,7 +6,7 @@
 #include "tests/kernels/rig.hpp"
 #include "tests/reference/coriolis_plain.hpp"
 
-namespace linden {
+namespace linden::velocity_down_test {
 namespace {
 
 const auto velocities = make_kernel(
@@ -144,4 +144,4 @@ TEST_CASE("the velocity sweeps give equal bits in every lane") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::velocity_down_test

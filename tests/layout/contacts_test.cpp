@@ -24,7 +24,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/layout/robots.hpp"
 
-using namespace linden;
+namespace linden::contacts_test {
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using Eigen::Vector3d;
@@ -654,3 +654,5 @@ TEST_CASE("generated humanoids have shapes, the other generated models none") {
     REQUIRE(generate(name).shapes.empty());
   }
 }
+
+}  // namespace linden::contacts_test

@@ -8,7 +8,7 @@
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 
-using namespace linden;
+namespace linden::effects_test {
 using Catch::Matchers::Contains;
 
 namespace {
@@ -331,3 +331,5 @@ TEST_CASE("what may be named twice may be", "[effects]") {
   effects.wrenches = {{.slot = 1}, {.slot = 1}};
   CHECK_NOTHROW(check(effects, model()));
 }
+
+}  // namespace linden::effects_test

@@ -9,7 +9,7 @@
 #include "models/urdf/urdf.hpp"
 #include "tests/layout/robots.hpp"
 
-using namespace linden;
+namespace linden::link_check_test {
 using Catch::Matchers::StartsWith;
 using Strings = std::vector<std::string>;
 
@@ -56,3 +56,5 @@ TEST_CASE("a body far from its joint, and one of which nothing but its joints is
   CHECK_THAT(told("0 0 0", far).front(), StartsWith("link \"b\": its inertia is not positive definite"));
   CHECK_THAT(told("0 0 0.1", "").front(), StartsWith("error: test.urdf: link \"b\": its inertia, with all that is fixed to it"));
 }
+
+}  // namespace linden::link_check_test

@@ -8,7 +8,7 @@
 #include "models/build/isometry.hpp"
 #include "models/urdf/urdf.hpp"
 
-using namespace linden;
+namespace linden::merged_models_test {
 using Catch::Matchers::Contains;
 
 namespace {
@@ -276,3 +276,5 @@ TEST_CASE("models hang from one another in a row, from what is fixed to the worl
   PlacedModel floating{load_urdf(kHumanoid, Base::floating), "h", Pose{}, "a/link1"};
   CHECK_THAT(message({part("a", ""), floating}), Contains("its base floats"));
 }
+
+}  // namespace linden::merged_models_test

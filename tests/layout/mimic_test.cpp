@@ -10,7 +10,7 @@
 #include "models/urdf/urdf.hpp"
 #include "tests/reference/mass_matrix_plain.hpp"
 
-using namespace linden;
+namespace linden::mimic_test {
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using Eigen::MatrixXd;
@@ -162,3 +162,5 @@ TEST_CASE("joints depend on each other where the tied mass matrix is singular in
 }
 
 }  // namespace
+
+}  // namespace linden::mimic_test

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-namespace linden {
+namespace linden::packed_history_test {
 namespace {
 
 constexpr int kLanes = 4;
@@ -86,4 +86,4 @@ TEST_CASE("two floats in a word keep their signs, their scales and their first d
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::packed_history_test

@@ -12,7 +12,7 @@
 #include "tests/engine/folder.hpp"
 #include "tests/layout/robots.hpp"
 
-using namespace linden;
+namespace linden::shape_mass_test {
 using Catch::Matchers::Contains;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -311,3 +311,5 @@ TEST_CASE("a floating base without inertia gets the mass of its shapes too, a fi
   REQUIRE(fixed.constants.subtree_mass(0) == Approx(2));
   REQUIRE(fixed.welded.mass() == Approx(24));
 }
+
+}  // namespace linden::shape_mass_test

@@ -6,7 +6,7 @@
 #include "models/build/generators.hpp"
 #include "models/build/merged_models.hpp"
 
-namespace linden {
+namespace linden::tree_test {
 namespace {
 
 std::vector<Model> large_trees() {
@@ -149,4 +149,4 @@ TEST_CASE("an order in which a child comes before its parent is refused") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::tree_test

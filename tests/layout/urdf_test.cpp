@@ -21,7 +21,7 @@
 #include "tests/layout/robots.hpp"
 #include "tests/reference/urdf_plain.hpp"
 
-using namespace linden;
+namespace linden::urdf_test {
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using reference::PlainLink;
@@ -794,3 +794,5 @@ TEST_CASE("a loop of many links is named in a few words") {
   REQUIRE_THAT(message, Contains(", ... hang from each other in a loop"));
   REQUIRE(message.size() < 300);
 }
+
+}  // namespace linden::urdf_test

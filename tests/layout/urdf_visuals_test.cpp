@@ -3,7 +3,7 @@
 #include "models/build/merged_models.hpp"
 #include "tests/layout/robots.hpp"
 
-namespace linden {
+namespace linden::urdf_visuals_test {
 namespace {
 
 using Rgba = std::array<double, 4>;
@@ -151,4 +151,4 @@ TEST_CASE("a visual too far away for numbers is left out and told") {
 }
 
 }  // namespace
-}  // namespace linden
+}  // namespace linden::urdf_visuals_test

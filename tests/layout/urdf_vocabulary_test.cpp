@@ -15,7 +15,7 @@
 #include "models/urdf/urdf.hpp"
 #include "tests/layout/robots.hpp"
 
-using namespace linden;
+namespace linden::urdf_vocabulary_test {
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using Strings = std::vector<std::string>;
@@ -383,3 +383,5 @@ TEST_CASE("of every robot what is not taken up is told, each thing once") {
     for (const std::string& warning : warnings) CHECK(warning.find("<xacro") == warning.npos);
   }
 }
+
+}  // namespace linden::urdf_vocabulary_test
