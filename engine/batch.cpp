@@ -52,7 +52,7 @@ BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, co
                        const BatchOptions& computed) {
   check_batch(size, options, computed);
   data_ = std::make_unique<Data>(required(std::move(model)), size, options, effects, computed);
-  if (!effects.motions.empty()) reset_all([](std::int64_t, std::span<double>, std::span<double>) {});
+  if (!effects.motions.empty() && data_->has_start.empty()) reset_all([](std::int64_t, std::span<double>, std::span<double>) {});
 }
 
 template <class Real>
@@ -295,6 +295,7 @@ std::string BatchOf<Real>::describe(std::int64_t i) const {
   StepReport report;
   report.status = instance.status;
   report.slot = instance.slot;
+  report.coupling = instance.coupling;
   report.residual = instance.residual;
   return linden::describe(report, model(), options().step);
 }

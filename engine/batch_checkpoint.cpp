@@ -1,6 +1,6 @@
 // Checkpoints of a Batch (engine/checkpoint_bytes.hpp), instance by instance, whatever the lanes are that they are computed in:
 //
-//   "linden batch 2\n"
+//   "linden batch 3\n"
 //   header: what it belongs to, instances, bytes of a number, numbers that effects keep, which rows there are, bytes of the text that follows
 //   kinds of effects and what they act on (engine/effects/effect_owners.hpp); their numbers may be others
 //   of each instance all rows that there are in the order of BatchOf::Data::each, then its record member by member
@@ -98,16 +98,17 @@ void for_instances(const Data& data, Byte* bytes, std::size_t of_each, const Wor
 
 /// What an instance that was read holds and none can hold; empty where it is sound. state: positions and momenta.
 template <class Real>
-std::string fault_of(const InstanceRecord& record, Index slots, const char* state, Index numbers) {
+std::string fault_of(const InstanceRecord& record, Index slots, Index couplings, const char* state, Index numbers) {
   for (Index k = 0; k < numbers; ++k, state += sizeof(Real)) {
     Real number;
     std::memcpy(&number, state, sizeof(number));
     if (!std::isfinite(number)) return "a number that is not finite";
   }
   const auto status = static_cast<int>(record.status);
-  if (status < 0 || status > static_cast<int>(StepStatus::not_finite)) return fmt::format("the status {}", status);
+  if (status < 0 || status > static_cast<int>(StepStatus::opens)) return fmt::format("the status {}", status);
   if (record.displacements < 0 || record.displacements > 2) return fmt::format("the displacements of {} steps", record.displacements);
   if (record.slot < 0 || record.slot >= slots) return fmt::format("the body {}", record.slot);
+  if (record.coupling < 0 || (record.coupling > 0 && record.coupling >= couplings)) return fmt::format("the coupling {}", record.coupling);
   if (record.steps < 0) return fmt::format("{} steps", record.steps);
   return {};
 }
@@ -127,7 +128,7 @@ std::vector<InstanceRecord> sound_records(const CheckpointReader& in, const Data
       std::memcpy(&number, from, sizeof(number));
       from += sizeof(number);
     });
-    const std::string found = fault_of<Real>(record, shape.slots, bytes, shape.positions + shape.velocities);
+    const std::string found = fault_of<Real>(record, shape.slots, static_cast<Index>(data.model->couplings.size()), bytes, shape.positions + shape.velocities);
     if (found.empty()) return;
     const std::lock_guard lock(telling);
     if (i < faulty) faulty = i, fault = found;
@@ -250,6 +251,7 @@ void BatchOf<Real>::restore(CheckpointBytes& bytes) {
     });
   });
   data.records = std::move(records);
+  data.has_start.clear();
 }
 
 template <class Real>

@@ -85,7 +85,12 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
     for (std::int64_t i = 0; i < size; ++i) forget_factor(i);
   }
   records.resize(static_cast<std::size_t>(size));
-  const std::vector<double> neutral = model->neutral();
+  std::vector<double> neutral = model->neutral();
+  if (!model->couplings.empty()) {
+    plan.put_positions(0, neutral);
+    neutral_start = assemble(*model, neutral, Assembled::if_nearly_closed);
+    if (!neutral_start.closed) has_start.assign(records.size(), 0);
+  }
   for_blocks([&](std::int64_t b, Worker&) {
     Real* to = q.data() + at(b, shape().positions);
     for (const double value : neutral) {
@@ -159,6 +164,17 @@ void BatchOf<Real>::Data::check_count(const char* what, std::size_t found, Index
 }
 
 template <class Real>
+void BatchOf<Real>::Data::require_starts() const {
+  const auto without = std::ranges::find(has_start, 0);
+  if (without == has_start.end()) return;
+  try {
+    require_closed(neutral_start);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("instance {} has not been reset: {}", without - has_start.begin(), error.what()));
+  }
+}
+
+template <class Real>
 void BatchOf<Real>::Data::place(std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) const {
   alone.forget();
   std::ranges::copy(positions, alone.state().q.flat().begin());
@@ -167,6 +183,7 @@ void BatchOf<Real>::Data::place(std::span<const double> positions, std::span<con
   for (std::size_t k = 0; k < velocities.size(); ++k) {
     if (!std::isfinite(velocities[k])) throw InputError(fmt::format("velocity \"{}\" is {}", model->names.velocity[k], velocities[k]));
   }
+  require_closed(alone.close_nearly_closed());
 }
 
 template <class Real>
@@ -196,6 +213,7 @@ void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> position
   clear(bend, shape().velocities, kAnyBend);
   clear(kept, plan.kept());
   forget_factor(i);
+  if (!has_start.empty()) has_start[static_cast<std::size_t>(i)] = 1;
   records[static_cast<std::size_t>(i)] = {};
 }
 

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/assembly.hpp"
 #include "engine/batch.hpp"
 #include "engine/effects/effect_plan.hpp"
 #include "engine/effects/own_numbers.hpp"
@@ -47,6 +48,8 @@ struct BatchOf<Real>::Data {
   Numbers<std::uint32_t> past, factor;
   std::vector<Index> first_child, child_list;  // see children
   std::vector<InstanceRecord> records;
+  Assembly neutral_start;               // of the zero configuration
+  std::vector<std::uint8_t> has_start;  // of each instance, where the zero configuration is open; else empty
   mutable oneapi::tbb::task_arena arena;
   mutable oneapi::tbb::enumerable_thread_specific<Worker> workers;
 
@@ -57,7 +60,7 @@ struct BatchOf<Real>::Data {
   std::size_t at(std::int64_t block, Index rows) const { return static_cast<std::size_t>(block) * static_cast<std::size_t>(rows * lanes); }
 
   /// Whether the factor of a step serves those that follow.
-  bool holds_factor() const { return hold_factors && options.order == 2 && !plan.has_states; }
+  bool holds_factor() const { return hold_factors && options.order == 2 && !plan.has_states && model->couplings.empty(); }
   /// Words of an instance's displacements: of every sub-step its own.
   Index past_rows() const;
   static constexpr Index kHeldNumbers = HeldFactor<Real>::kNumbers;
@@ -147,6 +150,8 @@ struct BatchOf<Real>::Data {
   void check_body(Index slot) const { require_one_of("body", slot, 1, model->tree.bodies()); }
 
   /// Positions into `alone`, as they are kept. Throws InputError for positions or velocities that make no sense.
+  /// Throws InputError for an instance whose couplings are open.
+  void require_starts() const;
   void place(std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone) const;
   void start(std::int64_t i, std::span<const double> positions, std::span<const double> velocities, InstanceStepper& alone);
 };

@@ -135,11 +135,13 @@ void BatchOf<Real>::Data::observe(const Observations& observations, std::span<Nu
 
 template <class Real>
 void BatchOf<Real>::step(std::int64_t n) {
+  data_->require_starts();
   data_->for_blocks([&](std::int64_t b, typename Data::Worker& worker) { worker.block->step(data_->block(b), n); });
 }
 
 template <class Real>
 void BatchOf<Real>::step(std::int64_t n, const BatchRows<Real>& rows) {
+  data_->require_starts();
   const std::vector<Servo>& servos = data_->plan.effects.servos;
   const std::vector<JointFriction>& frictions = data_->plan.effects.friction;
   const auto joint = [&](Index row) { return quoted(model().names.velocity[static_cast<std::size_t>(row)]); };

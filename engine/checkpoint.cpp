@@ -262,6 +262,7 @@ void Simulation::restore(CheckpointBytes& bytes) {
   history_ = static_cast<int>(header.history);
   go_on(continued);
   stepper_->refresh(state_);
+  assembly_ = stepper_->openness();
 }
 
 }  // namespace linden

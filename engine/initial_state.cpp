@@ -1,7 +1,12 @@
 #include "engine/initial_state.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "engine/assembly.hpp"
+#include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 #include "models/build/random.hpp"
 
 namespace linden {
@@ -29,9 +34,17 @@ std::vector<Bounded> bounded(const Model& model, std::span<const JointLimit> lim
   return result;
 }
 
-}  // namespace
+void close_couplings(const Model& model, std::uint64_t seed, double spread, std::vector<double>& positions) {
+  if (model.couplings.empty()) return;
+  const Assembly found = assemble(model, positions, Assembled::from_anywhere);
+  if (found.closed) return;
+  throw InputError(fmt::format("coupling {} cannot be closed from the random positions of seed {} and spread {:g}: {:.3g} is the least that it is open by; choose "
+                               "another seed, or a smaller spread",
+                               quoted(found.coupling), seed, spread, found.gap));
+}
 
-InitialState random_state(const Model& model, std::uint64_t seed, double spread, std::span<const JointLimit> limits) {
+/// Couplings are not looked at.
+InitialState draw_state(const Model& model, std::uint64_t seed, double spread) {
   const Tree& tree = model.tree;
   const double rate = spread / std::sqrt(static_cast<double>(tree.levels() - 1));
   Random random(seed);
@@ -57,16 +70,24 @@ InitialState random_state(const Model& model, std::uint64_t seed, double spread,
       if (run.kind == JointKind::free) put(state.velocities, v + 3, random_arrow(random, spread));
     }
   }
+  return state;
+}
+
+}  // namespace
+
+InitialState random_state(const Model& model, std::uint64_t seed, double spread, std::span<const JointLimit> limits) {
+  InitialState state = draw_state(model, seed, spread);
   for (const Bounded& joint : bounded(model, limits)) {
     double& q = state.positions[joint.q_row];
     q = std::clamp(q, joint.limit->lower, joint.limit->upper);
   }
+  close_couplings(model, seed, spread, state.positions);
   return state;
 }
 
 InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread,
                            std::span<const JointLimit> limits) {
-  const InitialState random = random_state(model, seed, spread);
+  const InitialState random = draw_state(model, seed, spread);
   InitialState state = start;
   if (state.positions.empty()) state.positions = model.neutral();
   state.velocities.resize(random.velocities.size(), 0.0);
@@ -86,6 +107,7 @@ InitialState random_around(const Model& model, const InitialState& start, std::u
     q = std::clamp(q, std::min(begin[joint.q_row], joint.limit->lower), std::max(begin[joint.q_row], joint.limit->upper));
   }
   for (std::size_t k = 0; k < state.velocities.size(); ++k) state.velocities[k] += random.velocities[k];
+  close_couplings(model, seed, spread, state.positions);
   return state;
 }
 

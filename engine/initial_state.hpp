@@ -31,7 +31,7 @@ struct InitialState {
 inline constexpr std::uint64_t kDefaultSeed = 1;
 inline constexpr double kDefaultSpread = 0.1;
 
-/// `limits`: in effect, one a row, as Effects has them.
+/// `limits`: in effect, one a row, as Effects has them. Here and below couplings are closed from there; InputError where they cannot be.
 InitialState random_state(const Model& model, std::uint64_t seed, double spread, std::span<const JointLimit> limits = {});
 
 /// A given start with those numbers on top: positions of screws, within their limits and no farther outside than the start is, and all

@@ -5,8 +5,10 @@
 # include one another by that prefix too; the build tree and an installation have the same copies. linden's own sources are compiled from
 # where they stand.
 set(linden_public_headers
+  engine/assembly.hpp
   engine/batch.hpp
   engine/batch_rows.hpp
+  engine/coupling_state.hpp
   engine/drift.hpp
   engine/effects/effect_work.hpp
   engine/effects/passive_watch.hpp
@@ -16,6 +18,7 @@ set(linden_public_headers
   engine/initial_state.hpp
   engine/instance_record.hpp
   engine/mass_distribution.hpp
+  engine/mobility.hpp
   engine/options.hpp
   engine/queries/centre_of_mass.hpp
   engine/queries/energy_by_effect.hpp
@@ -46,6 +49,7 @@ set(linden_public_headers
   layout/attributes.hpp
   layout/body_constants.hpp
   layout/contacts.hpp
+  layout/couplings.hpp
   layout/effects.hpp
   layout/field.hpp
   layout/model.hpp
@@ -56,6 +60,7 @@ set(linden_public_headers
   layout/support/input_error.hpp
   layout/tree.hpp
   models/build/builder.hpp
+  models/build/coupled_model.hpp
   models/build/generators.hpp
   models/build/isometry.hpp
   models/build/merged_models.hpp

@@ -48,6 +48,7 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
   for (const BodyWrench& wrench : plan_->effects.wrenches) own_wrenches_.push_back(numbers_of(wrench));
   changed();
   if (!plan_->curves.empty()) set_positions(model_->neutral());
+  close_nearly_closed();
 }
 
 Simulation::Simulation(const Scene& scene)
@@ -93,7 +94,24 @@ void Simulation::set_positions(std::span<const double> q) {
   const std::vector<double> rates = velocities();
   std::ranges::copy(given, state_.q.flat().begin());
   changed();
+  close_nearly_closed();
   set_velocities(rates);
+}
+
+/// A start that is open by what people round off, or more: see assemble.
+void Simulation::close_nearly_closed() {
+  if (model_->couplings.empty()) return;
+  assembly_ = stepper_->openness();
+  if (assembly_.relative <= kOpenStart) assembly_ = stepper_->assemble(state_);
+}
+
+Assembly Simulation::assemble() {
+  if (model_->couplings.empty()) return {};
+  const std::vector<double> rates = velocities();
+  assembly_ = stepper_->assemble(state_);
+  changed();
+  set_velocities(rates);
+  return assembly_;
 }
 
 void Simulation::set_velocities(std::span<const double> v) {
@@ -172,6 +190,8 @@ void Simulation::set_ground_friction(double coefficient) {
   stepper_->controls().set_ground_friction(coefficient);
 }
 
+std::vector<CouplingState> Simulation::couplings() const { return stepper_->couplings(state_.last_step(0)); }
+
 std::vector<double> Simulation::motion_forces() const {
   std::vector<double> forces;
   const auto count = static_cast<Index>(plan_->curves.size());
@@ -203,6 +223,7 @@ StepsReport Simulation::run(std::int64_t steps) {
 }
 
 StepReport Simulation::take_step(Then then) {
+  require_closed(assembly_);
   const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, then);
   if (report.ok()) {
     ++steps_;

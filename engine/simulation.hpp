@@ -27,6 +27,8 @@
 #include "engine/effects/effect_work.hpp"
 #include "engine/effects/passive_watch.hpp"
 #include "engine/effects/step_impulses.hpp"
+#include "engine/assembly.hpp"
+#include "engine/coupling_state.hpp"
 #include "engine/energy.hpp"
 #include "engine/guess/stage_guess.hpp"
 #include "engine/options.hpp"
@@ -144,6 +146,14 @@ class Simulation {
   /// began.
   std::vector<double> body_wrenches() const;
 
+  /// Moves the positions to where all couplings are closed, as near as the mass matrix measures, or to where they are least open; velocities stay.
+  /// set_positions does so by itself where kOpenStart of the mechanism's size are enough. Steps from a start that is open throw InputError.
+  Assembly assemble();
+  /// What there was to close, and is left open, of the positions set last.
+  const Assembly& openness() const { return assembly_; }
+  /// How far open the couplings of the model are, and what held them in the step taken last; of an order above 2 in its last sub-step.
+  std::vector<CouplingState> couplings() const;
+
   Energy energy();
   /// What effects gave and took since the start, runs that were continued included [J]. Total energy plus what was taken less what was given
   /// stays.
@@ -174,6 +184,7 @@ class Simulation {
   std::vector<double> mean_forces(const std::vector<double>& impulses) const;
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
+  void close_nearly_closed();
   StepReport take_step(Then then);
   StepReport step_in_stages();
 
@@ -183,6 +194,7 @@ class Simulation {
   State<double> state_;
   std::unique_ptr<Stepper> stepper_;
   Field<double> rate_;
+  Assembly assembly_;                                 // of the start
   std::vector<double> applied_;                       // forces that were set; empty: none
   std::vector<std::array<double, 6>> own_wrenches_;   // force and moment of each wrench as the effects have it
   EffectWork effect_work_;

@@ -9,6 +9,7 @@ namespace linden {
 void StepReport::add(const StepReport& more) {
   status = more.status;
   slot = more.slot;
+  coupling = more.coupling;
   iterations += more.iterations;
   evaluations += more.evaluations;
   factorisations += more.factorisations;
@@ -62,6 +63,7 @@ std::string describe(const StepReport& report, const Model& model, double step) 
   const auto slot = static_cast<std::size_t>(report.slot);
   const std::string where = fmt::format("body \"{}\" (joint \"{}\")", model.names.body[slot], model.names.joint[slot]);
   const std::string advice = fmt::format("try a step below {:.3g} s", step / 4);
+  const std::string coupling = model.couplings.empty() ? "" : model.couplings[static_cast<std::size_t>(report.coupling)].name;
   switch (report.status) {
     case StepStatus::past_pi:
       return fmt::format("{} turns by half a turn or more within a step of {:.3g} s, even split: {}", where, step, advice);
@@ -73,7 +75,16 @@ std::string describe(const StepReport& report, const Model& model, double step) 
       return fmt::format("the residual is not finite at {}, step {:.3g} s: look for a joint that moves no mass in this pose, for "
                          "speeds beyond reason, or {}",
                          where, step, advice);
+    case StepStatus::opens:
+      return fmt::format("coupling \"{}\" opens by {:.2g} of the size of its mechanism in a step of {:.3g} s, even split, and nothing can close it: its "
+                         "bodies are moved, held or stopped where it cannot follow; look at given motions and at other couplings of the same bodies",
+                         coupling, report.residual, step);
     default:
+      if (!coupling.empty()) {
+        return fmt::format("the step of {:.3g} s did not converge: relative residual {:.2e} after {} iterations, largest at {}; of couplings \"{}\" is "
+                           "farthest open; see whether the mechanism can move where it stands (inspect tells), or {}",
+                           step, report.residual, report.iterations, where, coupling, advice);
+      }
       return fmt::format("the step of {:.3g} s did not converge: relative residual {:.2e} after {} iterations, largest at {}; {}",
                          step, report.residual, report.iterations, where, advice);
   }

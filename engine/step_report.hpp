@@ -15,6 +15,7 @@ enum class StepStatus {
   past_pi,        // a body turns by half a turn or more in one step, which the log map cannot represent
   gains_energy,   // the solution found is not the motion's: a second root, met where the step is far too large
   not_finite,     // a residual that is NaN or infinite: a singular joint or an overflow
+  opens,          // a coupling would open: its bodies are moved or held where it cannot follow
 };
 
 struct StepReport {
@@ -26,8 +27,9 @@ struct StepReport {
   int blows = 0;           // impulses at which joints met limits
   int substeps = 1;        // above 1: the step, or one of the sub-steps that an order above 2 is made of, failed whole and was split
   bool at_rounding_floor = false;  // stopped above the tolerance, where rounding lets the residual fall no further
-  double residual = 0;      // sqrt(1/2 r.M^-1 r / kinetic energy) at the end, the largest over sub-steps
+  double residual = 0;      // sqrt(1/2 r.M^-1 r / kinetic energy) at the end, the largest over sub-steps; of `opens` gap / size of the mechanism
   Index slot = 0;           // where it failed: the body that turns too far or the joint with the largest residual; 0 = fine
+  Index coupling = 0;       // likewise, of couplings the one that is farthest open
 
   /// Counts what another sub-step took; its status and trouble are those of the whole.
   void add(const StepReport& more);

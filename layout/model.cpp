@@ -37,6 +37,21 @@ std::uint64_t Model::hash() const {
     hash.add_number(mimic.multiplier);
     hash.add_number(mimic.offset);
   }
+  for (const Coupling& coupling : couplings) {
+    hash.add_number(coupling.kind);
+    hash.add_number(coupling.slot_a);
+    hash.add_number(coupling.slot_b);
+    for (const Pose* frame : {&coupling.frame_a, &coupling.frame_b}) {
+      for (const double number : frame->rotation) hash.add_number(number);
+      for (const double number : frame->shift) hash.add_number(number);
+    }
+    hash.add_number(coupling.length);
+    hash.add_number(coupling.offset);
+    for (const GearTerm& term : coupling.terms) {
+      hash.add_number(term.v_row);
+      hash.add_number(term.ratio);
+    }
+  }
   return hash.value();
 }
 

@@ -8,6 +8,7 @@
 
 #include "layout/attributes.hpp"
 #include "layout/body_constants.hpp"
+#include "layout/couplings.hpp"
 #include "layout/names.hpp"
 #include "layout/shapes.hpp"
 #include "layout/tree.hpp"
@@ -29,6 +30,7 @@ struct Model {
   BodyConstants<double> constants;
   Attributes attributes;
   std::vector<Mimic> mimics;
+  std::vector<Coupling> couplings;
   Names names;
   std::string source;                      // file it was read from, which names of meshes are relative to; empty = made in code
   std::vector<BodyShape> shapes;           // sorted by slot; none of slot 0
@@ -44,7 +46,7 @@ struct Model {
   /// Zero configuration [nq]: zeros, identity quaternions, mimic joints at their offsets.
   std::vector<double> neutral() const;
 
-  /// Hash of everything the motion depends on (topology, constants, mimics): a checkpoint belongs to one hash. Shapes and
+  /// Hash of everything the motion depends on (topology, constants, mimics, couplings): a checkpoint belongs to one hash. Shapes and
   /// visuals move nothing by themselves and are not in it.
   std::uint64_t hash() const;
 };

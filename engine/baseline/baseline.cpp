@@ -22,6 +22,7 @@
 #include "kernels/tree/velocity_down.hpp"
 #include "kernels/tree/world_placement_down.hpp"
 #include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {
@@ -70,6 +71,10 @@ Baseline::Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Opti
       plan_(std::make_unique<const EffectPlan>(*model_, options, effects)),
       ties_(std::make_unique<MimicTies<double>>(model_->mimics, model_->tree)) {
   check(options);
+  if (!model_->couplings.empty()) {
+    throw InputError(fmt::format("{} moves trees alone; model {} has a coupling, {}; step it by linden's own method", name(scheme), quoted(model_->names.model),
+                                 quoted(model_->couplings.front().name)));
+  }
   if (const std::string refused = sudden(effects); !refused.empty()) {
     throw InputError(fmt::format("{} has no forces that change suddenly; the scene has {}", name(scheme), refused));
   }

@@ -9,7 +9,7 @@
 // + 1/2 [u, v] + 1/12 [u, [u, v]], without which it would be of second order there (Munthe-Kaas).
 //
 // acts    gravity, and every effect as the force that it is at the time of an evaluation: `push` of its law (kernels/effects/law.hpp). What changes
-//         suddenly, as its facts say, is refused: friction, limits, servos with limited force, given motions, ground
+//         suddenly, as its facts say, is refused: friction, limits, servos with limited force, given motions, ground; and so are couplings
 // cost    an evaluation is some 150 ns a body, as much as a step of order 2 takes: placements, velocities, forces up, factor up,
 //         accelerations down
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3; Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8
@@ -39,7 +39,7 @@ std::string_view name(Scheme scheme);
 class Baseline {
  public:
   /// At rest in the model's zero configuration. Of the options it takes step and gravity. Throws InputError for an effect that
-  /// it has not.
+  /// it has not, and for a model with couplings.
   Baseline(std::shared_ptr<const Model> model, Scheme scheme, const Options& options, const Effects& effects = {});
   ~Baseline();
 

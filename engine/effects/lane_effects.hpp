@@ -103,10 +103,14 @@ class LaneEffects {
     }
   }
 
-  /// Velocities no farther from the mean ones of the last step than the motion bends.
+  /// Velocities no farther from the mean ones of the last step than the motion bends; those of a start as they are.
   void follow_motion(const Block<Real>& block, const Pack& rate, Field<Pack>& v) const {
     constexpr int words = kHistoryWords<Real> * W;
-    for (Index row = 0; row < v.rows(); ++row) v(row) = sweeps_.within_bend(row, v(row), rate * last_displacement(block.past + row * words));
+    Lanes moved = 0;
+    for (int l = 0; l < block.count; ++l) moved |= Lanes{block.instances[l].steps > 0} << l;
+    for (Index row = 0; row < v.rows(); ++row) {
+      v(row) = select(L::mask(moved), sweeps_.within_bend(row, v(row), rate * last_displacement(block.past + row * words)), v(row));
+    }
   }
 
   /// What is lane l's own, and what effects keep of it, for it to be stepped alone; contact points as they ended the step before, whatever

@@ -17,8 +17,8 @@
 namespace linden {
 namespace {
 
-const std::string kStatuses[] = {"converged", "not_converged", "past_pi", "gains_energy", "not_finite"};
-static_assert(std::size(kStatuses) == static_cast<std::size_t>(StepStatus::not_finite) + 1, "every status has a name");
+const std::string kStatuses[] = {"converged", "not_converged", "past_pi", "gains_energy", "not_finite", "opens"};
+static_assert(std::size(kStatuses) == static_cast<std::size_t>(StepStatus::opens) + 1, "every status has a name");
 
 std::unique_ptr<ArrayFile> array_file(const std::string& file, std::int64_t instances, int packers) {
   const std::string ending = std::filesystem::path(file).extension().string();

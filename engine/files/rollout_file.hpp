@@ -9,7 +9,7 @@
 //   v          [F, N, nv]  velocities
 //   status     [F, N]      uint8, see StepStatus; 0 = fine, else frozen at its last good state from this frame on
 //   positions  [nq], velocities [nv]         names of the coordinates; in h5py text is data["positions"].asstr()[:]
-//   statuses   [5]                           what the numbers of `status` mean
+//   statuses   [6]                           what the numbers of `status` mean
 //
 // Beside them there may be arrays [N, columns] or [N] of numbers that do not change, each with the names of its columns: what was drawn for
 // every instance of a scene that is randomised.

@@ -30,14 +30,15 @@ constexpr double kSmallestAlone = 1.0 / 64, kAloneTolerance = 1e-11, kJudgedAlon
 constexpr double kReferenceShare = 0.22;  // of the budget, for each of the two
 constexpr double kShort = 0.03;           // CPU seconds below which a run is timed again
 
-constexpr AccuracyMethod kOrder2{Kind::composed, 2}, kOrder8{Kind::composed, 8}, kRk4{Kind::rk4, 4},
+constexpr AccuracyMethod kOrder2{Kind::composed, 2}, kOrder6{Kind::composed, 6}, kOrder8{Kind::composed, 8}, kRk4{Kind::rk4, 4},
     kEuler{Kind::semi_implicit_euler, 1};
 
-/// Those that know what the scene's effects do.
-std::vector<AccuracyMethod> methods_for(const Effects& effects) {
-  if (irreversible(effects).empty()) return {kOrder2, {Kind::composed, 4}, {Kind::composed, 6}, kOrder8, kRk4, kEuler};
-  if (sudden(effects).empty()) return {kOrder2, kRk4, kEuler};
-  return {kOrder2};
+/// Those that know what the scene's effects and couplings do.
+std::vector<AccuracyMethod> methods_for(const Model& model, const Effects& effects) {
+  std::vector<AccuracyMethod> methods{kOrder2};
+  if (irreversible(effects).empty()) methods.insert(methods.end(), {{Kind::composed, 4}, kOrder6, kOrder8});
+  if (sudden(effects).empty() && model.couplings.empty()) methods.insert(methods.end(), {kRk4, kEuler});
+  return methods;
 }
 
 double cpu_seconds() {
@@ -64,8 +65,8 @@ struct Motion {
 class AccuracyMeasurement {
  public:
   AccuracyMeasurement(const AccuracySetup& setup, const std::function<bool(double)>& go_on)
-      : setup_(setup), go_on_(go_on), begin_(Clock::now()), methods_(methods_for(setup.effects)),
-        reversible_(irreversible(setup.effects).empty()), smooth_(sudden(setup.effects).empty()) {
+      : setup_(setup), go_on_(go_on), begin_(Clock::now()), methods_(methods_for(*setup.model, setup.effects)),
+        reversible_(irreversible(setup.effects).empty()) {
     figures_.asked = setup.duration;
     every_ = kLargest * setup.options.step;
     while (every_ > setup.duration / 4 && every_ > setup.options.step) every_ /= 2;
@@ -266,9 +267,10 @@ class AccuracyMeasurement {
   void find_reference() {
     AccuracyReference& reference = figures_.reference;
     const double h = setup_.options.step;
-    if (!smooth_) return find_reference_alone();
+    const bool has_rk4 = std::ranges::find(methods_, kRk4) != methods_.end();
+    if (!has_rk4 && !reversible_) return find_reference_alone();
     reference.method = reversible_ ? kOrder8 : kOrder2;
-    reference.other = kRk4;
+    reference.other = has_rk4 ? kRk4 : kOrder6;
     reference.step = reversible_ ? std::min(4 * h, every_) : std::min(h, every_ / 2);
     reference.other_step = h;
     const double smallest = reversible_ ? kSmallest : kSmallestOfRk4;
@@ -279,9 +281,9 @@ class AccuracyMeasurement {
       return;
     }
     const std::optional<Motion> theirs =
-        refined(kRk4, reference.other_step, kSmallestOfRk4 * h, elapsed() + kReferenceShare * setup_.budget, &*ours);
+        refined(reference.other, reference.other_step, (has_rk4 ? kSmallestOfRk4 : kSmallest) * h, elapsed() + kReferenceShare * setup_.budget, &*ours);
     if (!theirs) {
-      reference.failure = "no run of RK4 came to its end";
+      reference.failure = fmt::format("no run of {} came to its end", name(reference.other));
       return;
     }
     const Agreement found = agreement(*ours, *theirs);
@@ -408,7 +410,7 @@ class AccuracyMeasurement {
   const std::function<bool(double)>& go_on_;
   Clock::time_point begin_;
   std::vector<AccuracyMethod> methods_;
-  bool reversible_, smooth_;  // what all effects are
+  bool reversible_;  // all effects are
   double every_;  // [s] between samples, the largest step
   bool interrupted_ = false;
   std::int64_t judged_ = 0;  // the sample at the horizon

@@ -4,7 +4,7 @@
 //
 //   methods    orders 2, 4, 6, 8 of linden; RK4 and semi-implicit Euler, as other engines step (engine/baseline/baseline.hpp). Scenes with
 //              damping, servos, torques, wrenches or drag have no orders above 2; with friction, limits or ground there is but
-//              order 2
+//              order 2; RK4 and Euler move trees alone, without couplings
 //   steps      16, 8, 4, 2, 1, 1/2, 1/4 times the step of the options
 //   also       the solver's tolerance from 1e-6 to 1e-12 for orders 2 and 6, and order 2 in single precision, all at the step of
 //              the options
@@ -13,7 +13,7 @@
 //              do not the motion is chaotic as far as anybody can tell: errors are judged at the horizon, the last time to which
 //              they agree to kJudged, and beyond it energy alone is. Without higher orders order 2 takes the place of order 8, its
 //              leading error taken away by a run at twice the step; where there is order 2 alone it is compared with itself at twice
-//              the step, and judged to kJudgedAlone.
+//              the step, and judged to kJudgedAlone. Where there are couplings order 6 takes the place of RK4.
 //   error      largest difference of a coordinate to the reference [rad, m]; of a quaternion twice its components', an angle.
 //              Never less than what the two references leave open.
 //   energy     band max H - min H and slope of H, sampled as a run is (energy_stride), relative to the largest kinetic energy of the

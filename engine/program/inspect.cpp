@@ -15,6 +15,8 @@
 #include "engine/files/output_file.hpp"
 #include "engine/files/report_files.hpp"
 #include "engine/mass_distribution.hpp"
+#include "engine/mobility.hpp"
+#include "engine/program/couplings_text.hpp"
 #include "engine/program/effect_cost.hpp"
 #include "engine/program/effects_text.hpp"
 #include "engine/scene/load_model.hpp"
@@ -155,6 +157,11 @@ struct Costs {
   std::vector<EffectCost> effects;  // of a scene
 };
 
+/// Where the scene begins, or in the zero configuration.
+Mobility mobility_at_start(const InspectArguments& arguments, const Model& model) {
+  return mobility_of(model, arguments.scene ? std::span<const double>(arguments.scene->initial.positions) : std::span<const double>());
+}
+
 Costs measure(const InspectArguments& arguments, const Model& model) {
   const EffectPlan plan(model, arguments.options, arguments.effects());
   Costs costs;
@@ -167,8 +174,8 @@ Costs measure(const InspectArguments& arguments, const Model& model) {
 
 class Printer {
  public:
-  Printer(const InspectArguments& arguments, const Model& model, const Costs& costs)
-      : arguments_(arguments), model_(model), bodies_(bodies_of(model)), costs_(costs) {}
+  Printer(const InspectArguments& arguments, const Model& model, const Costs& costs, const Mobility& mobility)
+      : arguments_(arguments), model_(model), bodies_(bodies_of(model)), costs_(costs), mobility_(mobility) {}
 
   void print() const {
     totals();
@@ -177,6 +184,7 @@ class Printer {
     conventions();
     merged();
     mimics();
+    couplings();
     sweeps();
     warnings();
   }
@@ -203,8 +211,10 @@ class Printer {
                               massless == 0 ? "" : fmt::format("; {} massless", grouped(massless))));
     const auto followers = static_cast<std::int64_t>(model_.mimics.size());
     const std::string mimics = followers == 0 ? "" : fmt::format(" less {}", counted(followers, "mimic joint"));
-    row("freedom", fmt::format("{} of freedom; {} in q, {} in v{}", counted(model_.degrees_of_freedom(), "degree"),
-                               counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics));
+    const Index held = mobility_.rows - mobility_.held_already;
+    const std::string couplings = held == 0 ? "" : fmt::format(" less {} that couplings hold", grouped(held));
+    row("freedom", fmt::format("{} of freedom; {} in q, {} in v{}{}", counted(mobility_.freedom, "degree"),
+                               counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics, couplings));
     row("mass", fmt::format("{:.6g} kg; centre of mass ({:.6g}, {:.6g}, {:.6g}) m in the zero configuration", masses.mass,
                             masses.center[0], masses.center[1], masses.center[2]));
     if (model_.welded.mass() > 0) row("", fmt::format("{:.6g} kg of links fixed to the world beside it, which move nothing", model_.welded.mass()));
@@ -306,6 +316,12 @@ class Printer {
     left_out(model_.mimics.size());
   }
 
+  void couplings() const {
+    if (model_.couplings.empty()) return;
+    say("\ncouplings, {}\n", arguments_.scene ? "where the scene begins" : "in the zero configuration");
+    say_couplings(model_, mobility_, shown(model_.couplings.size()));
+  }
+
   void sweeps() const {
     say("\nsweeps of a step, solver {}, in order\n", name(arguments_.options.solver));
     Table table({{"when", Align::left}, {"sweep", Align::left}, {"ns/body", Align::right}, {"reads", Align::left}, {"writes", Align::left}},
@@ -335,9 +351,10 @@ class Printer {
   const Model& model_;
   std::vector<BodyFacts> bodies_;
   const Costs& costs_;
+  const Mobility& mobility_;
 };
 
-Json json_of(const InspectArguments& arguments, const Model& model, const Costs& costs) {
+Json json_of(const InspectArguments& arguments, const Model& model, const Costs& costs, const Mobility& mobility) {
   const Tree& tree = model.tree;
   const MassDistribution masses = mass_distribution(model, model.neutral());
   const std::vector<BodyFacts> bodies = bodies_of(model);
@@ -348,7 +365,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
               {"source", arguments.model},
               {"base", base_of(model)},
               {"bodies", tree.bodies()},
-              {"dofs", model.degrees_of_freedom()},
+              {"dofs", mobility.freedom},
               {"positions", tree.shape.positions},
               {"velocities", tree.shape.velocities},
               {"mass", masses.mass},
@@ -398,6 +415,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
                       {"multiplier", mimic.multiplier},
                       {"offset", mimic.offset}});
   }
+  result["couplings"] = couplings_json(model, mobility);
   Json& sweeps = result["sweeps"] = Json::array();
   for (std::size_t k = 0; k < costs.sweeps.size(); ++k) {
     const Sweep& sweep = costs.sweeps[k];
@@ -429,8 +447,9 @@ int inspect(const InspectArguments& arguments) {
   const std::shared_ptr<const Model> loaded = arguments.loaded(outputs);
   const Model& model = *loaded;
   const Costs costs = measure(arguments, model);
-  if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs));
-  Printer(arguments, model, costs).print();
+  const Mobility mobility = mobility_at_start(arguments, model);
+  if (!arguments.json.empty()) write_json(arguments.json, json_of(arguments, model, costs, mobility));
+  Printer(arguments, model, costs, mobility).print();
   return 0;
 }
 

@@ -31,8 +31,10 @@
 namespace linden {
 namespace {
 
-constexpr const char* kSceneHelp = "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
-constexpr const char* kModelHelp = "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N";
+constexpr const char* kSceneHelp =
+    "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, net:AxB";
+constexpr const char* kModelHelp =
+    "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, net:AxB";
 
 /// An empty text is how the code says that an option is absent; one that is written out is a slip, such as of a variable in a script.
 std::string filled(const std::string& text) {

@@ -72,8 +72,9 @@ std::string model_text(const ModelArguments& arguments, const Model& model) {
   const std::string name = model.names.model.starts_with(arguments.model)
                                ? printable(model.names.model)
                                : printable(fmt::format("{} ({})", model.names.model, arguments.model));
-  return fmt::format("{}: {}, {} of freedom, {:.5g} kg, {}", name, counted(model.tree.bodies(), "body"),
-                     counted(model.degrees_of_freedom(), "degree"), model.constants.subtree_mass(0), base_of(model));
+  const std::string tied = model.couplings.empty() ? "" : fmt::format(" but for {}", counted(std::ssize(model.couplings), "coupling"));
+  return fmt::format("{}: {}, {} of freedom{}, {:.5g} kg, {}", name, counted(model.tree.bodies(), "body"),
+                     counted(model.degrees_of_freedom(), "degree"), tied, model.constants.subtree_mass(0), base_of(model));
 }
 
 std::string gravity_text(const Options& options) {

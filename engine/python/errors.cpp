@@ -35,7 +35,8 @@ void bind_errors(nb::module_& m) {
       .value("not_converged", StepStatus::not_converged, "The residual would not go below the tolerance.")
       .value("past_pi", StepStatus::past_pi, "A body would turn by half a turn or more in one step.")
       .value("gains_energy", StepStatus::gains_energy, "The solution found is not the motion's, but another root.")
-      .value("not_finite", StepStatus::not_finite, "The residual is NaN or infinite.");
+      .value("not_finite", StepStatus::not_finite, "The residual is NaN or infinite.")
+      .value("opens", StepStatus::opens, "A coupling would open: its bodies are moved or held where it cannot follow.");
 
   nb::class_<StepReport>(m, "StepReport", "How the solve of one step went.")
       .def_ro("status", &StepReport::status)

@@ -193,6 +193,26 @@ void bind_contact(nb::module_& m) {
       });
 }
 
+void bind_coupling(nb::module_& m) {
+  nb::class_<CouplingState>(m, "Coupling", "How far open a coupling is, and what held it in the step taken last, row by row.")
+      .def_ro("name", &CouplingState::name)
+      .def_prop_ro(
+          "gaps", [](const CouplingState& self) { return fixed_array(std::span<const double>(self.gaps)); },
+          "Where the bodies are now [rows; m, or cosine of an angle; of a gear as its coordinates].")
+      .def_prop_ro(
+          "forces", [](const CouplingState& self) { return fixed_array(std::span<const double>(self.forces)); },
+          "Over the step taken last [rows; N, N m]: of a shift along its axis of the first link, on the second.")
+      .def_prop_ro(
+          "held_already",
+          [](const CouplingState& self) {
+            nb::typed<nb::list, bool> rows;
+            for (const bool held : self.redundant) rows.append(held);
+            return rows;
+          },
+          "Rows that other rows hold: their force is zero.")
+      .def("__repr__", [](const CouplingState& self) { return fmt::format("Coupling(\"{}\", {} rows)", self.name, self.gaps.size()); });
+}
+
 /// What it is, and what is asked of its state.
 void bind_state(nb::class_<PySimulation>& c) {
   c.def_prop_ro("scene", &PySimulation::scene)
@@ -296,6 +316,16 @@ void bind_steps(nb::class_<PySimulation>& c) {
       .def(
           "keep_forces", [](PySimulation& self) { self.to_change().keep_forces(); },
           "From the next step on what effects apply is kept, at the cost of a pass up the tree a step: for the five that follow.")
+      .def_prop_ro(
+          "couplings", [](PySimulation& self) { return self.ask([](Simulation& simulation) { return simulation.couplings(); }); },
+          "Of each coupling of the model its gaps and forces.")
+      .def(
+          "assemble",
+          [](PySimulation& self) {
+            self.change([](Simulation& simulation) { require_closed(simulation.assemble()); });
+          },
+          "Moves q to where all couplings are closed, as near as the mass matrix measures; velocities stay. Raises InputError where they "
+          "cannot be: q is then where they are least open.")
       .def_prop_ro("contacts", &contacts, "Every place where the ground pushes, in the step taken last; needs keep_forces before it.")
       .def_prop_ro(
           "joint_forces", [](PySimulation& self) { return fixed_array(self.look().joint_forces()); },
@@ -337,6 +367,7 @@ void bind_steps(nb::class_<PySimulation>& c) {
 void bind_simulations(nb::module_& m) {
   bind_joint(m);
   bind_contact(m);
+  bind_coupling(m);
   nb::class_<PySimulation> c(m, "Simulation");
   c.def(nb::init<std::shared_ptr<Scene>>(), "scene"_a);
   bind_state(c);

@@ -95,6 +95,11 @@ std::vector<double> solve_mass_matrix(const Kinematics& state, std::span<const d
 }
 
 std::vector<double> forward_dynamics(const Kinematics& state, std::span<const double> tau) {
+  if (!state.model().couplings.empty()) {
+    throw InputError(fmt::format("forward dynamics of model {}: it has a coupling, {}, whose force is not known without a step; ask Simulation::accelerations "
+                                 "for those of a motion, or a model without couplings for those of its tree",
+                                 quoted(state.model().names.model), quoted(state.model().couplings.front().name)));
+  }
   std::vector<double> f = bias_forces(state);
   if (tau.size() != f.size()) {
     throw InputError(

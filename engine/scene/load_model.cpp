@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
@@ -42,12 +41,10 @@ void require_memory(const std::string& what, double bytes) {
 }
 
 double memory_of(const std::string& name) {
-  constexpr double kBytesPerBody = 2600;  // of building and simulating chain:1000000
-  const std::string_view count = std::string_view(name).substr(name.find(':') + 1);
-  double bodies = 0;
-  std::from_chars(count.data(), count.data() + count.size(), bodies);
-  if (name.starts_with("humanoids:")) bodies *= kHumanoidBodies;
-  return std::isnan(bodies) ? 0 : bodies * kBytesPerBody;
+  constexpr double kBytesPerBody = 2600;      // of building and simulating chain:1000000
+  constexpr double kBytesPerPairOfRows = 16;  // of couplings: two matrices of all rows
+  const GeneratedSize size = generated_size(name);
+  return size.bodies * kBytesPerBody + size.rows * size.rows * kBytesPerPairOfRows;
 }
 
 void check_memory(const std::string& name) { require_memory(name, memory_of(name)); }

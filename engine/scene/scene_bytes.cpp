@@ -14,6 +14,8 @@ namespace linden {
 template <>
 inline constexpr JointKind kLastOf<JointKind> = JointKind::free;
 template <>
+inline constexpr CouplingKind kLastOf<CouplingKind> = static_cast<CouplingKind>(kCouplingKinds - 1);
+template <>
 inline constexpr ShapeKind kLastOf<ShapeKind> = ShapeKind::mesh;
 template <>
 inline constexpr Solver kLastOf<Solver> = Solver::riqn;
@@ -45,6 +47,7 @@ class ModelCheck {
     each_field(model_.attributes, [](double value) { return !std::isnan(value); });
     check_names();
     check_mimics();
+    check_couplings();
     for (const BodyShape& shape : model_.shapes) check_shape(shape);
     for (const BodyVisual& visual : model_.visuals) check_shape(visual.shape);
     for (const BodyShape& shape : model_.welded.shapes) check_welded_shape(shape);
@@ -115,6 +118,24 @@ class ModelCheck {
       require(followers.insert(mimic.follower_slot).second, "a joint that follows twice");
     }
     for (const Mimic& mimic : model_.mimics) require(!followers.contains(mimic.leader_slot), "a joint that follows one that follows");
+  }
+  void check_couplings() const {
+    for (const Coupling& coupling : model_.couplings) {
+      const bool gear = coupling.kind == CouplingKind::gear;
+      require(gear != coupling.terms.empty(), "a coupling without what it couples");
+      for (const Index slot : {coupling.slot_a, coupling.slot_b}) require(slot == 0 || moves(slot), "a coupling of a body that there is not");
+      require(gear || coupling.slot_a != coupling.slot_b, "a coupling of a body with itself");
+      check_place(coupling.frame_a);
+      check_place(coupling.frame_b);
+      require(std::isfinite(coupling.length) && std::isfinite(coupling.offset), "a coupling with a number that is not finite");
+      for (const GearTerm& term : coupling.terms) {
+        bool is_screw = false;
+        for (Index i = 1; i < tree_.shape.slots; ++i) {
+          is_screw |= tree_.kind(i) == JointKind::screw && tree_.first_v(i) == term.v_row && tree_.first_q(i) == term.q_row;
+        }
+        require(is_screw && std::isfinite(term.ratio) && term.ratio != 0, "a gear of a joint that there is not");
+      }
+    }
   }
 
   const Model& model_;

@@ -9,8 +9,10 @@
 #include <unordered_set>
 #include <utility>
 
+#include "engine/assembly.hpp"
 #include "engine/effects/stiff_contact.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/scene/scene_couplings.hpp"
 #include "engine/scene/scene_effects.hpp"
 #include "engine/scene/scene_start.hpp"
 #include "engine/scene/scene_yaml.hpp"
@@ -28,11 +30,12 @@ using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
                                       "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
-                                      "inertia", "randomize"};
+                                      "inertia", "randomize", "couplings", "assemble"};
 const std::vector<std::string> kModel{"model",    "base",       "name",     "parent", "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
 const std::vector<std::string> kInertia{"density"};
+const std::vector<std::string> kYesNo{"true", "false"};
 const std::vector<std::string> kStarts{"checked", "as given"};
 constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 
@@ -53,12 +56,14 @@ class SceneReader {
   Scene read() {
     root_.entries_of(kScene, effect_keys(), "effects");
     read_model();
+    if (const auto couplings = root_.find("couplings")) scene_.model = read_couplings(*couplings, std::move(scene_.model));
     read_options();
     const auto initial = root_.find("initial"), effects = root_.find("effects");
     if (const auto rule = root_.find("start")) scene_.start_as_given = rule->choice(kStarts) == "as given";
     Effects limited;
     if (effects) limited.limits = read_limits(*effects, scene_.model);
     scene_.initial = read_start(initial, scene_.model, bases_, given_, limited.limits);
+    close_couplings(initial);
     require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
     require_finite(initial.value_or(root_), "velocity", scene_.initial.velocities, scene_.model.names.velocity);
     if (!scene_.start_as_given && !limited.limits.empty()) move_onto_limits(limited, initial ? initial->place() : file_);
@@ -102,6 +107,26 @@ class SceneReader {
                          "leave it out: it starts where effects.motion does");
       }
     }
+  }
+
+  /// Loops are closed before the motion begins; a start that leaves them open by more than what people round off has to ask for it.
+  void close_couplings(const std::optional<SceneValue>& initial) {
+    const auto asked = root_.find("assemble");
+    const bool assemble = asked && asked->choice(kYesNo) == "true";
+    if (scene_.model.couplings.empty()) {
+      if (asked) asked->fail("there is nothing to assemble", "couplings", "leave it out");
+      return;
+    }
+    if (scene_.start_as_given) return;
+    const Assembly open = linden::assemble(scene_.model, scene_.initial.positions, assemble ? Assembled::from_anywhere : Assembled::if_nearly_closed);
+    if (open.closed) return;
+    const SceneValue at = initial.value_or(root_);
+    if (assemble) {
+      at.fail(fmt::format("coupling {} cannot be closed: {:.3g} is the least that it is open by", quoted(open.coupling), open.gap),
+              "a mechanism that can be put together", "look at its frames and lengths, or start nearer to where it closes");
+    }
+    at.fail(fmt::format("coupling {} is open by {:.3g} at the start, {:.2g} of the size of its mechanism", quoted(open.coupling), open.gap, open.relative),
+            "positions that close it", "change them, or write assemble: true");
   }
 
   /// What rounding puts outside limits is moved, and told. What cannot be a start is refused by those who begin there.

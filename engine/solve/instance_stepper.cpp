@@ -59,6 +59,13 @@ StepReport InstanceStepper::step(double time) {
   return whole;
 }
 
+Assembly InstanceStepper::close_nearly_closed() {
+  if (model_.couplings.empty()) return {};
+  refresh();
+  const Assembly open = stepper_->openness();
+  return open.relative > kOpenStart ? open : stepper_->assemble(state_);
+}
+
 void InstanceStepper::set_velocities(std::span<const double> v) {
   refresh();
   std::ranges::copy(v, rate_.flat().begin());

@@ -34,6 +34,8 @@ class InstanceStepper {
   /// One step of the state, from `time` on; after one that failed the state is no more what it was. The latest row of state().history and
   /// state().last_step say what is known of the step before.
   StepReport step(double time);
+  /// Closes the couplings of a start that leaves them nearly closed; returns how far open they are.
+  Assembly close_nearly_closed();
   /// p = M(q) v.
   void set_velocities(std::span<const double> v);
   /// Energy; and rate() is the velocity that is read.

@@ -51,6 +51,10 @@ inline constexpr double kFreeCosine = 0.99875026;                 // of half of 
 /// gain 0.02 to 0.12 at most; second roots, met from 8 ms on, 0.77 and more.
 inline constexpr double kMostGain = 0.25;
 
+/// A row of a coupling that others hold already is watched: it may open by this share of the size of its mechanism, ten times what axes may be
+/// off that are taken for parallel (kernels/couplings/masked_solve.hpp). Beyond that the bodies cannot go where they are sent.
+inline constexpr double kMostOpen = 3e-4;
+
 /// An evaluation of the residual.
 template <class S>
 struct Evaluated {

@@ -249,6 +249,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     if (!report.ok()) {
       instance.status = report.status;
       instance.slot = report.slot;
+      instance.coupling = report.coupling;
       instance.residual = report.residual;
       return false;
     }

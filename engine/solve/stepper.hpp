@@ -12,6 +12,8 @@
 #include <span>
 #include <vector>
 
+#include "engine/assembly.hpp"
+#include "engine/coupling_state.hpp"
 #include "engine/effects/effect_controls.hpp"
 #include "engine/effects/effect_work.hpp"
 #include "engine/effects/step_impulses.hpp"
@@ -59,6 +61,12 @@ class Stepper {
   virtual void keep_impulses() = 0;
   virtual const StepImpulses& impulses() const = 0;
 
+  /// Of the step taken last, of h seconds; without one no force.
+  virtual std::vector<CouplingState> couplings(double h) const = 0;
+  /// How far open they are at the positions of the last refresh; assemble: brings the positions to where they are closed, or least open.
+  virtual Assembly openness() = 0;
+  virtual Assembly assemble(State<double>& state) = 0;
+
   /// To set effects, and what they keep of the step taken last.
   virtual EffectControls controls() = 0;
   /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
@@ -68,8 +76,8 @@ class Stepper {
   /// but potentials; else p is read with the effects' impulses taken half at each end of the last step, what they hold is at rest, and no
   /// velocity is farther from the mean one of that step than the motion bends.
   virtual void read_velocity(const State<double>& state, Field<double>& v) = 0;
-  /// p = M(q) v.
-  virtual void momentum_of(const Field<double>& v, Field<double>& p) = 0;
+  /// p = M(q) v of a start, whose velocities are brought to the nearest that leave couplings closed.
+  virtual void momentum_of(Field<double>& v, Field<double>& p) = 0;
   /// Momentum of the whole system about the world's origin, in the world's frame, as its energy is. rate: scratch.
   virtual Wrench<double> total_momentum(const State<double>& state, Field<double>& rate) = 0;
   /// Of a state with the positions of the last refresh or step; rate: its velocity. The kinetic energy is that of p and of M^-1 p as they

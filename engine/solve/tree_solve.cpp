@@ -62,7 +62,7 @@ StepStatus TreeSolve<kEffects>::run(Evaluated<double> now, Factor factor, double
   const double relative = now.scale > 0 ? std::sqrt(0.5 * now.norm / now.scale) : std::sqrt(now.norm);
   if (solved.done == 0) {
     held_.drop();
-    failed_residual_ = relative;
+    failed_residual_ = status_ == StepStatus::opens ? sweeps_.widest_gap() : relative;
     return status_;
   }
   const bool at_floor = solve.seen().at_floor;
@@ -72,6 +72,14 @@ StepStatus TreeSolve<kEffects>::run(Evaluated<double> now, Factor factor, double
   least_w_ = now.least_w;
   mean_kinetic_ = now.energy / (h * h);
   return StepStatus::converged;
+}
+
+/// A displacement that would open a coupling is none.
+template <bool kEffects>
+Lanes TreeSolve<kEffects>::refused(Lanes solved) {
+  if (solved == 0 || sweeps_.widest_gap() <= kMostOpen) return 0;
+  status_ = StepStatus::opens;
+  return 1;
 }
 
 template <bool kEffects>

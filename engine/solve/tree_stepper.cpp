@@ -66,9 +66,28 @@ StepReport TreeStepper<kEffects>::whole_step(State<double>& state, int& history,
     return report;
   }
   report.residual = solve_.failed_residual();
+  if (cannot_follow(state)) {
+    report.status = StepStatus::opens;
+    report.residual = sweeps_.widest_gap();
+  }
+  if (!model_.couplings.empty()) report.coupling = sweeps_.widest_coupling();
   restore(state);
   history = history_before;
   return report;
+}
+
+/// Whether nothing closes the couplings where the part of the step that was tried last, from this state, leads joints whose motion is given.
+template <bool kEffects>
+bool TreeStepper<kEffects>::cannot_follow(const State<double>& state) {
+  if constexpr (kEffects) {
+    if (model_.couplings.empty() || effects_.plan().effects.motions.empty()) return false;
+    std::ranges::fill(work_.delta.flat(), 0.0);
+    effects_.put_motions(work_.delta);
+    Field<double> led = state.q;
+    sweeps_.displace(led);
+    return !sweeps_.assemble(led).closed;
+  }
+  return false;
 }
 
 /// The state at the beginning of the step, and what effects keep beside it.

@@ -47,15 +47,22 @@ class TreeStepper final : public Stepper {
   const EffectAccount& effect_account() const override { return account_; }
   void keep_impulses() override;
   const StepImpulses& impulses() const override;
+  std::vector<CouplingState> couplings(double h) const override { return sweeps_.couplings(h); }
+  Assembly openness() override { return sweeps_.openness(); }
+  Assembly assemble(State<double>& state) override { return sweeps_.assemble(state.q); }
   EffectControls controls() override;
   std::vector<std::span<double>> memory() override;
   void read_velocity(const State<double>& state, Field<double>& v) override;
-  void momentum_of(const Field<double>& v, Field<double>& p) override { sweeps_.momentum_of(v, p); }
+  void momentum_of(Field<double>& v, Field<double>& p) override {
+    sweeps_.close_velocities(v);
+    sweeps_.momentum_of(v, p);
+  }
   Wrench<double> total_momentum(const State<double>& state, Field<double>& rate) override;
   Energy energy_of(const State<double>& state, Field<double>& rate) override;
 
  private:
   StepReport whole_step(State<double>& state, int& history, double time, double h, Then then);
+  bool cannot_follow(const State<double>& state);
   bool gains_energy(const State<double>& state, int history, double h, StepReport& report);
   void begin_effects(const State<double>& state, double h)
     requires kEffects;

@@ -23,6 +23,7 @@
 #include "engine/effects/lane_effects.hpp"
 #include "engine/solve/block_stepper.hpp"
 #include "engine/solve/judge.hpp"
+#include "engine/sweeps/coupling_sweeps.hpp"
 #include "engine/sweeps/lane_factor.hpp"
 #include "kernels/block/advance_down.hpp"
 #include "kernels/block/block_factor_up.hpp"
@@ -49,7 +50,7 @@ class LaneSweeps {
 
   explicit LaneSweeps(const BlockSetup<Real>& setup)
       : tree_(setup.model.tree), options_(setup.options), constants_(setup.constants), step_(options_.step), effects_(setup),
-        factor_(setup.model, setup.holds_factor) {
+        couplings_(setup.model), factor_(setup.model, setup.holds_factor) {
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     if constexpr (!kEffects) kept_.allocate(shape);
@@ -145,6 +146,7 @@ class LaneSweeps {
   Evaluated<Pack> start(const Block<Real>& block, Lanes alive) {
     const Lanes due = alive & factor_.due(block, tolerance_);
     Evaluated<Pack> now;
+    couplings_.begin();
     if constexpr (kEffects) {
       effects_.begin(block, step_, q_, work_);
       const Evaluation<Pack> moved = start_down(tree_, constants_, work_);
@@ -152,6 +154,7 @@ class LaneSweeps {
       now = evaluated(moved, due, 0);
     } else {
       start_down(tree_, constants_, work_);
+      find_gaps();
       if (due != 0) make_factor(due, Jacobian::first_order);
       now.norm = pass_up();
     }
@@ -164,6 +167,7 @@ class LaneSweeps {
   // what solve.hpp asks
   Evaluated<Pack> evaluate(Lanes active, Lanes corrected, int round) {
     const Mask mask = L::mask(corrected);
+    if (coupled()) take_multipliers(L::mask(active));
     const Evaluation<Pack> moved = tied() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
     const Pack before = norm_;
     const Evaluated<Pack> now = evaluated(moved, active & ~corrected, corrected & slow_);
@@ -179,8 +183,14 @@ class LaneSweeps {
   }
   Lanes close(const Evaluated<Pack>&) const { return 0; }
   Lanes at_floor(const Evaluated<Pack>& now, double epsilons) const {
-    const Pack sum = rounding_floor_map(tree_, constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
-    return L::bits(below_ceiling(now.norm, now.energy, fall())) & L::bits(is_rounding(now.norm, sum, epsilons));
+    Pack sum = rounding_floor_map(tree_, constants_, work_.momentum_target, work_.impulse, work_.joint_inverse);
+    Lanes gaps_alone = 0;  // where nothing moves, gaps are all there is
+    if (coupled()) {
+      const Pack of_gaps = couplings_.rounding();
+      gaps_alone = L::bits(is_rounding(now.norm, of_gaps, epsilons));
+      sum = sum + of_gaps;
+    }
+    return gaps_alone | (L::bits(below_ceiling(now.norm, now.energy, fall())) & L::bits(is_rounding(now.norm, sum, epsilons)));
   }
   bool has_states() const {
     if constexpr (kEffects) return effects_.plan().has_states;
@@ -197,9 +207,12 @@ class LaneSweeps {
     }
     return 0;
   }
-  Lanes refused([[maybe_unused]] Lanes lanes) const {
-    if constexpr (kEffects) return lanes != 0 ? lanes & effects_.blows(q_, work_.delta) : 0;
-    return 0;
+  Lanes refused(Lanes lanes) const {
+    if (lanes == 0) return 0;
+    Lanes found = 0;
+    if constexpr (kEffects) found = effects_.blows(q_, work_.delta);
+    if (coupled()) found |= ~L::bits(couplings_.widest_gap() <= number(kMostOpen));
+    return lanes & found;
   }
   void put_aside([[maybe_unused]] Lanes done, [[maybe_unused]] Lanes before, [[maybe_unused]] Lanes active) {
     if constexpr (!kEffects) {
@@ -273,6 +286,7 @@ class LaneSweeps {
   /// The upward half, with a factor made anew to first order in some lanes, exactly in others.
   Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes first_order, Lanes exact) {
     Evaluated<Pack> now{.least_w = moved.least_w, .energy = moved.energy};
+    find_gaps();
     if constexpr (kEffects) effects_.act(constants_, work_, now.energy);
     if (first_order != 0) make_factor(first_order, Jacobian::first_order);
     if (exact != 0) make_factor(exact, Jacobian::exact);
@@ -291,6 +305,7 @@ class LaneSweeps {
       factor_tied(NothingAdded{});
     }
     if (tied()) tie(&LaneSweeps::increments);
+    if (coupled()) factor_couplings(Coupled::step, factor_.fresh(), L::mask(lanes));
     factor_.take(lanes, work_);
   }
   /// The second half of a solve: increments or rates.
@@ -321,7 +336,11 @@ class LaneSweeps {
   }
   /// Residual and first half of a solve; of joints that are tied all of it, the correction in work_.increment. Returns the norm.
   Pack pass_up() {
-    const Pack norm = innovation_up(tree_, constants_, work_);
+    Pack norm = innovation_up(tree_, constants_, work_);
+    if (coupled()) {
+      give_way(Coupled::step, {work_.gain_up, work_.gain_down, work_.joint_inverse}, factor_.ties(), &work_.impulse);
+      norm = energy_norm(tree_, work_.joint_inverse, work_.innovation);
+    }
     if (!tied()) return norm;
     increments({work_.gain_up, work_.gain_down, work_.joint_inverse}, work_.increment);
     const Pack of_ties = factor_.ties().complete(work_.increment);
@@ -329,6 +348,23 @@ class LaneSweeps {
     return norm + of_ties;
   }
   bool tied() { return !factor_.ties().empty(); }
+  bool coupled() const { return !couplings_.empty(); }
+
+  // what couplings do (coupling_sweeps.hpp); not inline, as above
+  [[gnu::noinline]] void find_gaps() { couplings_.find_gaps(work_.displacement, work_.delta); }
+  [[gnu::noinline]] void factor_couplings(Coupled of, const Gains<Pack>& gains, const Mask& lanes) {
+    couplings_.factor(of, constants_, work_.placement, of == Coupled::step ? &work_.motion : nullptr, gains, factor_.fresh_ties(), lanes);
+  }
+  [[gnu::noinline]] void give_way(Coupled of, const Gains<Pack>& gains, MimicTies<Pack>& ties, Field<Pack, 6>* with) {
+    couplings_.give_way(of, constants_, work_.placement, gains, ties, work_.innovation, with);
+  }
+  [[gnu::noinline]] void take_multipliers(const Mask& lanes) {
+    Field<Pack>* target = &work_.momentum_target;
+    if constexpr (kEffects) {
+      if (effects_.plan().joints) target = &effects_->plain_target();
+    }
+    couplings_.take_multipliers(lanes, *target);
+  }
 
   Pack fall() const { return fall_per_mass_ * constants_.subtree_mass(0); }
 
@@ -339,6 +375,7 @@ class LaneSweeps {
     } else {
       advance_down<false>(tree_, constants_, gravity_, moves, work_, q_);
     }
+    couplings_.place(work_.placement, q_);
   }
   void update_momentum(const Mask& moves) {
     const Pack h = number(step_);
@@ -348,13 +385,17 @@ class LaneSweeps {
 
   template <class Added>
   [[gnu::noinline]] void factor_mass(const Added& added) {
-    if (!tied()) return find_articulated_inertias(added);
-    find_articulated_inertias(factor_.fresh_ties().held(added));
-    tie(&LaneSweeps::rates);
+    if (!tied()) {
+      find_articulated_inertias(added);
+    } else {
+      find_articulated_inertias(factor_.fresh_ties().held(added));
+      tie(&LaneSweeps::rates);
+    }
+    if (coupled()) factor_couplings(Coupled::velocities, mass_gains(), L::mask(~Lanes(0)));
   }
   template <class Added>
   [[gnu::noinline]] void find_rate(const Added& added) {
-    if (tied()) {
+    if (tied() || coupled()) {
       factor_mass(added);
       return apply_mass_inverse(p_, work_.increment);
     }
@@ -364,6 +405,7 @@ class LaneSweeps {
   }
   [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
     impulses_up(mass_gains(), right_side);
+    if (coupled()) give_way(Coupled::velocities, mass_gains(), factor_.fresh_ties(), nullptr);
     rates(mass_gains(), rate);
     if (tied()) factor_.fresh_ties().complete(rate);
   }
@@ -409,6 +451,7 @@ class LaneSweeps {
   Lanes slow_ = 0;     // lanes in which a correction left too much
   Field<Pack> q_, p_, applied_;
   [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;
+  CouplingSweeps<Pack> couplings_;
   LaneFactor<Pack> factor_;
 };
 

@@ -67,6 +67,15 @@ void factor_ties(Memory m, const Gains<double>& gains, bool newton) {
       [&](Index i) { return tied_load(m.model.tree, m.constants, gains, m.work.bias, m.work.variation, i); }, m.work.increment);
 }
 
+/// S and its factor; newton: with the factor of the Jacobian, else with that of the mass matrix.
+void factor_couplings(Memory m, Coupled of, const Gains<double>& gains, bool newton) {
+  m.couplings.factor(of, m.constants, m.work.placement, newton ? &m.work.motion : nullptr, gains, m.ties, true);
+}
+void give_way(Memory m, Coupled of, const Gains<double>& gains, Field<double, 6>* with) {
+  m.couplings.give_way(of, m.constants, m.work.placement, gains, m.ties, m.work.innovation, with);
+}
+void find_norm(Memory m) { m.now.norm = energy_norm(m.model.tree, m.work.joint_inverse, m.work.innovation); }
+
 void spread(Memory m, Slots) { spread_mimics<double>(m.ties.mimics(), m.work.delta); }
 void place(Memory m, Slots part) { placement_map(m.model.tree, m.constants, m.state.q, part, m.work.placement); }
 void move(Memory m, Slots part) { motion_map(m.model.tree, m.constants, m.work.delta, part, m.work.motion); }
@@ -86,6 +95,7 @@ const Array kResidual{"residual", [](Memory m) -> Field<double>& { return m.work
 const Array kDelta{"delta", [](Memory m) -> Field<double>& { return m.work.delta; }};
 
 constexpr std::string_view kTies = "ties: a tree solve for each leader", kCompletion = "ties: completion";
+constexpr std::string_view kCouplingRows = "couplings: rows, and their factor", kGiveWay = "couplings: give way";
 
 /// Writes the list phase by phase.
 class Writer {
@@ -111,6 +121,7 @@ class Writer {
     return sweep;
   }
   bool ties() const { return !draft_.model.mimics.empty(); }
+  bool couplings() const { return !draft_.model.couplings.empty(); }
   bool newton() const { return draft_.options.solver == Solver::newton; }
   bool one_pass() const { return draft_.strategy.one_pass; }
 
@@ -132,6 +143,7 @@ class Writer {
 };
 
 void Writer::first() {
+  if (couplings()) add(When::first, "couplings: no multipliers", "", "couplings", [](Memory m, Slots) { m.couplings.begin(); });
   add(When::first, "momentum_target_map", "p, force", "momentum_target", [](Memory m, Slots part) {
     momentum_target_map(m.model.tree, m.options.step, m.state.p, m.work.force, part, m.work.momentum_target);
   }, Way::down);
@@ -206,14 +218,22 @@ void Writer::explicit_guess() {
 
 void Writer::factor_mass_matrix(When when) {
   add(when, "articulated_inertia_up", "inertia, screw, placement", "articulated, mass gains", factor_mass);
-  if (!ties()) return;
-  add(when, kTies, "screw, placement, mass gains", "ties, bias, innovation, variation, increment",
-      [](Memory m, Slots) { factor_ties(m, m.mass_gains(), false); });
+  if (ties()) {
+    add(when, kTies, "screw, placement, mass gains", "ties, bias, innovation, variation, increment",
+        [](Memory m, Slots) { factor_ties(m, m.mass_gains(), false); });
+  }
+  if (!couplings()) return;
+  add(when, kCouplingRows, "screw, placement, mass gains, ties, couplings", "couplings",
+      [](Memory m, Slots) { factor_couplings(m, Coupled::velocities, m.mass_gains(), false); });
 }
 
 void Writer::solve_mass_matrix(When when, const Array& right_side, const Array& solution) {
   add(when, "impulse_pass_up", "screw, placement, mass gains, " + right_side.name, "bias, innovation",
       [of = right_side.of](Memory m, Slots) { pass_up(m, m.mass_gains(), of(m)); });
+  if (couplings()) {
+    add(when, kGiveWay, "screw, placement, mass gains, ties, couplings, innovation", "couplings, innovation",
+        [](Memory m, Slots) { give_way(m, Coupled::velocities, m.mass_gains(), nullptr); });
+  }
   add(when, "rate_down", "screw, placement, mass gains, innovation", "variation, " + solution.name,
       [of = solution.of](Memory m, Slots) { pass_down_mass(m, m.mass_gains(), of(m)); });
   if (!ties()) return;
@@ -221,12 +241,23 @@ void Writer::solve_mass_matrix(When when, const Array& right_side, const Array& 
 }
 
 void Writer::evaluation() {
+  if (couplings()) {
+    const bool joints = draft_.plan.joints;
+    const std::string target = joints ? "joint impulses" : "momentum_target";
+    add(When::evaluation, "couplings: take multipliers", "couplings, " + target, "couplings, " + target, [joints](Memory m, Slots) {
+      m.couplings.take_multipliers(true, joints ? m.effects->plain_target() : m.work.momentum_target);
+    });
+  }
   add(When::evaluation, "displacement_down", "placement, motion", "displacement", [](Memory m, Slots part) {
     m.now.least_w = std::min(m.now.least_w, displacement_down(m.model.tree, m.work.placement, m.work.motion, part, m.work.displacement));
   }, Way::down);
   add(When::evaluation, "momentum_map", "inertia, displacement", "impulse", [](Memory m, Slots part) {
     m.now.energy += momentum_map(m.model.tree, m.constants, m.work.displacement, part, m.work.impulse);
   }, draft_.strategy.order == Order::long_chain ? Way::parents_up : Way::down);
+  if (couplings()) {
+    add(When::evaluation, "couplings: gaps", "screw, displacement, delta, couplings", "couplings",
+        [](Memory m, Slots) { m.couplings.find_gaps(m.work.displacement, m.work.delta); });
+  }
   add_action_of_effects(draft_);
   std::string added = draft_.plan.joints ? ", joint impulses" : "";
   if (draft_.plan.bodies) added += ", body impulses";
@@ -241,9 +272,19 @@ void Writer::evaluation() {
         "ties, bias, innovation, variation, increment",
         [newton = newton()](Memory m, Slots) { factor_ties(m, m.gains(), newton); });
   }
+  if (couplings()) {
+    add(When::factor, kCouplingRows, newton() ? "screw, placement, motion, gains, ties, couplings" : "screw, placement, gains, ties, couplings", "couplings",
+        [newton = newton()](Memory m, Slots) { factor_couplings(m, Coupled::step, m.gains(), newton); });
+  }
   if (!one_pass()) return residual_by_itself();
   add(When::evaluation, "innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation",
       [](Memory m, Slots part) { m.now.norm += innovation_up(m.model.tree, m.constants, part, m.work); }, Way::up).sums = true;
+  if (couplings()) {
+    add(When::evaluation, kGiveWay, "screw, placement, gains, couplings, impulse, innovation", "couplings, impulse, innovation", [](Memory m, Slots) {
+      give_way(m, Coupled::step, m.gains(), &m.work.impulse);
+      find_norm(m);
+    });
+  }
   if (!draft_.strategy.finds_end_momenta()) return;
   add(When::evaluation, "momentum_at_end_map", "screw, displacement, impulse, innovation", "end_momentum", [](Memory m, Slots part) {
     if (!m.finds_end_momenta) return;
@@ -261,6 +302,14 @@ void Writer::residual_by_itself() {
   }
   add(When::evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation",
       [](Memory m, Slots) { pass_up(m, m.gains(), m.work.residual); });
+  if (couplings()) {
+    add(When::evaluation, kGiveWay, "screw, placement, gains, ties, couplings, residual, innovation", "couplings, residual, innovation", [](Memory m, Slots) {
+      give_way(m, Coupled::step, m.gains(), nullptr);
+      find_norm(m);
+      m.couplings.subtract_push(m.work.residual);
+      fold_mimics(m.ties.mimics(), m.work.residual);
+    });
+  }
   if (!ties()) return;
   if (newton()) {
     add(When::evaluation, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment",
@@ -359,6 +408,9 @@ void Writer::complete() {
 
 void Writer::arrival() {
   add(When::arrival, "placement_map", "tree_placement, screw, q", "placement", place, Way::down);
+  if (couplings()) {
+    add(When::arrival, "couplings: places", "screw, placement, q", "couplings", [](Memory m, Slots) { m.couplings.place(m.work.placement, m.state.q); });
+  }
   if (!draft_.strategy.gravity) return;
   add(When::arrival, "gravity_field_down", "placement", "field", [](Memory m, Slots part) {
     const std::array<double, 3>& g = m.options.gravity;

@@ -12,7 +12,8 @@ StepMemory::StepMemory(const Model& its_model, const Options& its_options, const
       plan(its_plan),
       strategy(strategy_of(its_model, its_options, its_plan)),
       constants(its_model.constants),
-      ties(its_model.mimics, its_model.tree) {
+      ties(its_model.mimics, its_model.tree),
+      couplings(its_model) {
   const Shape& shape = model.tree.shape;
   state.allocate(shape);
   work.allocate(shape);

@@ -6,6 +6,7 @@
 
 #include "engine/options.hpp"
 #include "engine/solve/judge.hpp"
+#include "engine/sweeps/coupling_sweeps.hpp"
 #include "engine/sweeps/strategy.hpp"
 #include "kernels/effects/law.hpp"
 #include "kernels/tree/mimic.hpp"
@@ -47,6 +48,7 @@ struct StepMemory {
   Workspace<double> work;
   MassFactor<double> mass;  // empty where no factor outlasts a step
   MimicTies<double> ties;
+  CouplingSweeps<double> couplings;
   std::unique_ptr<EffectSweeps<double>> effects;  // null without
   Field<double> before;
 

@@ -15,24 +15,22 @@ void TreeSweeps<kEffects>::with_ties(const Added& added, const Action& action) {
   action(ties_.held(added));
 }
 
-/// down(x): the second half of a solve.
+/// Where joints are tied, what becomes of a factor with them held. down(x): the second half of a solve.
 template <bool kEffects>
 template <class Down>
 void TreeSweeps<kEffects>::tie(const Gains<double>& gains, const Down& down) {
   if (ties_.empty()) return;
-  ties_.factor(
-      [&](const Field<double>& r, Field<double>& x) {
-        impulse_pass_up(model_.tree, *constants_, work_.placement, gains, r, work_.bias, work_.innovation);
-        down(x);
-      },
-      [&](Index i) { return tied_load(model_.tree, *constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
+  const auto solve = [&](const Field<double>& r, Field<double>& x) {
+    impulse_pass_up(model_.tree, *constants_, work_.placement, gains, r, work_.bias, work_.innovation);
+    down(x);
+  };
+  ties_.factor(solve, [&](Index i) { return tied_load(model_.tree, *constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::tie_rates(const Gains<double>& gains) {
-  tie(gains, [&](Field<double>& x) {
-    rate_down(model_.tree, *constants_, work_.placement, gains, work_.innovation, work_.variation, x);
-  });
+void TreeSweeps<kEffects>::factor_couplings(Coupled of, const Gains<double>& gains, double damping) {
+  const bool increments = of == Coupled::step && options_.solver == Solver::newton;
+  couplings_.factor(of, *constants_, work_.placement, increments ? &work_.motion : nullptr, gains, ties_, true, damping);
 }
 
 template <bool kEffects>
@@ -47,22 +45,37 @@ void TreeSweeps<kEffects>::factor() {
       }
     });
   });
-  if (options_.solver == Solver::riqn) return tie_rates(gains());
-  tie(gains(), [&](Field<double>& x) {
-    increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
-  });
+  const auto down = [&](Field<double>& x) {
+    if (options_.solver == Solver::riqn) {
+      rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, x);
+    } else {
+      increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
+    }
+  };
+  tie(gains(), down);
+  factor_couplings(Coupled::step, gains());
 }
 
-/// Ties between joints make the whole solve necessary for the norm.
 template <bool kEffects>
 double TreeSweeps<kEffects>::pass_residual() {
-  const double norm =
-      impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
-  if (ties_.empty()) return norm;
+  double norm = impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
+  if (!couplings_.empty()) {
+    norm = give_way(nullptr);
+    couplings_.subtract_push(work_.residual);
+    fold_mimics(ties_.mimics(), work_.residual);
+  }
+  if (!solves_with_residual()) return norm;
   pass_down(work_.increment);
   double tied = 0;
   for (Index row = 0; row < model_.tree.shape.velocities; ++row) tied += work_.residual(row) * work_.increment(row);
   return std::abs(tied);
+}
+
+/// Between the halves of a solve of a step; returns the norm of what is left.
+template <bool kEffects>
+double TreeSweeps<kEffects>::give_way(Field<double, 6>* with) {
+  couplings_.give_way(Coupled::step, *constants_, work_.placement, gains(), ties_, work_.innovation, with);
+  return energy_norm(model_.tree, work_.joint_inverse, work_.innovation);
 }
 
 template <bool kEffects>
@@ -77,19 +90,44 @@ void TreeSweeps<kEffects>::pass_down(Field<double>& correction) {
 
 template <bool kEffects>
 template <class Added>
-void TreeSweeps<kEffects>::factor_mass(const Added& added) {
+void TreeSweeps<kEffects>::factor_mass(const Added& added, Coupled of, double damping) {
   place_all();
   with_ties(added, [&](const auto& all) {
     articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), all);
   });
-  tie_rates(mass_gains());
+  tie(mass_gains(), [&](Field<double>& x) { rates(x); });
+  factor_couplings(of, mass_gains(), damping);
+}
+
+/// Of positions or velocities that are to close couplings; joints whose motion is given keep theirs.
+template <bool kEffects>
+void TreeSweeps<kEffects>::factor_for_start(Coupled of, double damping) {
+  const auto factor = [&](const auto& added) { factor_mass(added, of, damping); };
+  if constexpr (kEffects) {
+    effects_.begin_blow();
+    effects_.with_reading(factor);
+  } else {
+    factor(NothingAdded{});
+  }
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v) {
-  impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, work_.bias, work_.innovation);
+void TreeSweeps<kEffects>::rates(Field<double>& v) {
   rate_down(model_.tree, *constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, v);
+}
+
+/// What couplings make of the first half of a solve with the mass matrix, and its second half.
+template <bool kEffects>
+void TreeSweeps<kEffects>::complete_rates(Coupled of, Field<double>& v, const Field<double>* given) {
+  couplings_.give_way(of, *constants_, work_.placement, mass_gains(), ties_, work_.innovation, nullptr, given);
+  rates(v);
   if (!ties_.empty()) ties_.complete(v);
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given) {
+  impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, work_.bias, work_.innovation);
+  complete_rates(Coupled::velocities, v, given);
 }
 
 template <bool kEffects>
@@ -130,7 +168,7 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
       for (Index row = 0; row < read_.rows(); ++row) read_(row) -= work_.momentum(row);
     }
     effects_.with_reading([&](const auto& added) { factor_mass(added); });
-    apply_mass_inverse(read_, v);
+    apply_mass_inverse(read_, v, given ? &given_ : nullptr);
     if (given) {
       for (Index row = 0; row < v.rows(); ++row) v(row) += given_(row);
       momentum_of(v, read_);
@@ -140,6 +178,21 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
     velocity_of(p, v);
     return p;
   }
+}
+
+template <bool kEffects>
+std::vector<CouplingState> TreeSweeps<kEffects>::couplings(double h) const {
+  std::vector<CouplingState> states;
+  for (std::size_t row = 0; const Coupling& coupling : model_.couplings) {
+    CouplingState& state = states.emplace_back();
+    state.name = coupling.name;
+    for (const std::size_t end = row + rows_of(coupling.kind).size(); row < end; ++row) {
+      state.gaps.push_back(couplings_.gap(row));
+      state.forces.push_back(h != 0 ? couplings_.multiplier(row) / (h * h) : 0);
+      state.redundant.push_back(couplings_.is_held_already(row));
+    }
+  }
+  return states;
 }
 
 template class TreeSweeps<LINDEN_ACTING>;

@@ -30,7 +30,8 @@ void TreeSweeps<kEffects>::place_again(Slots part) {
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::find_potentials([[maybe_unused]] const Field<double>& q) {
+void TreeSweeps<kEffects>::find_potentials(const Field<double>& q) {
+  couplings_.place(work_.placement, q);
   if (strategy_.gravity) potential_ = gravity_potential(work_.field, work_.first_moment);
   if constexpr (kEffects) {
     effect_potential_ = effects_.refresh(work_.placement, q);

@@ -20,6 +20,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       options_(options),
       strategy_(strategy_of(model, options, plan)),
       ties_(model.mimics, model.tree),
+      couplings_(model),
       effects_(plan, model),
       tree_(model.tree) {
   work_.allocate(model.tree.shape);
@@ -34,6 +35,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
                                                  const BeforeUp& before_up) {
   report.evaluations += 1;
   if (factor == Factor::fresh) report.factorisations += 1;
+  take_multipliers();
   Evaluated<double> now;
   const auto move = [&](Slots part, Evaluated<double>& sum) {
     motions(part);
@@ -47,7 +49,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
     move(part, sum);
     momenta(part, sum);
   };
-  if (!kEffects && strategy_.one_pass) {
+  if (!kEffects && strategy_.one_pass && couplings_.empty()) {
     valid_.evaluation = !strategy_.shares_rows;
     valid_.end_momenta = factor == Factor::kept && strategy_.finds_end_momenta();
     valid_.placements = !strategy_.shares_rows;
@@ -77,6 +79,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
   in_parts_down(all_slots(model_.tree), [&](Slots part) { down(part, now); });
   before_up(all_slots(model_.tree), now);
   now.scale = now.energy;
+  couplings_.find_gaps(work_.displacement, work_.delta);
   act(now);
   pass_up(now, factor);
   return now;
@@ -92,6 +95,16 @@ void TreeSweeps<kEffects>::complete() {
   momentum_map(model_.tree, *constants_, work_.displacement, work_.impulse);
   innovation_up(model_.tree, *constants_, all, work_);
   valid_.evaluation = true;
+}
+
+/// What couplings pushed in the last solve joins that which the residual is to be: of effects on joints, what they start from.
+template <bool kEffects>
+void TreeSweeps<kEffects>::take_multipliers() {
+  Field<double>* target = &work_.momentum_target;
+  if constexpr (kEffects) {
+    if (effects_.plan().joints) target = &effects_.plain_target();
+  }
+  couplings_.take_multipliers(true, *target);
 }
 
 /// Effects on bodies and joints, for the displacements of an evaluation.
@@ -134,9 +147,13 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::pass_up(Evaluated<double>& now, Factor how) {
   if (strategy_.one_pass) {
     now.norm = 0;
-    return effects_.with_added([&](const auto& added) {
+    effects_.with_added([&](const auto& added) {
       in_parts_up(all_slots(model_.tree), [&](Slots part) { now.norm += pass_part(part, how, added); });
     });
+    if (couplings_.empty()) return;
+    if (how == Factor::fresh) factor_couplings(Coupled::step, gains());
+    now.norm = give_way(&work_.impulse);
+    return;
   }
   if (how == Factor::fresh) factor();
   now.plain = residual_up(model_.tree, *constants_, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
@@ -210,7 +227,7 @@ template <bool kEffects>
 Evaluated<double> TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
   report.iterations += 1;
   if (!strategy_.one_pass) {
-    if (ties_.empty()) {
+    if (!solves_with_residual()) {
       pass_down(work_.applied);
     } else {
       std::swap(work_.increment, work_.applied);  // pass_residual has solved already
@@ -249,9 +266,11 @@ double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before)
 
 template <bool kEffects>
 bool TreeSweeps<kEffects>::at_floor(const Evaluated<double>& now, double fall, double epsilons) {
+  if (!couplings_.empty() && is_rounding(now.norm, couplings_.rounding(), epsilons)) return true;  // where nothing moves, gaps are all there is
   if (!below_ceiling(now.norm, now.energy, fall)) return false;
   complete();
-  return is_rounding(now.norm, rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields()), epsilons);
+  const double rounding = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields());
+  return is_rounding(now.norm, rounding + couplings_.rounding(), epsilons);
 }
 
 /// h x momenta at the beginning of a step of displacement work_.delta from where the bodies are; returns h^2 x its kinetic energy.

@@ -23,11 +23,14 @@
 #include <span>
 #include <vector>
 
+#include "engine/assembly.hpp"
+#include "engine/coupling_state.hpp"
 #include "engine/effects/no_effects.hpp"
 #include "engine/guess/extrapolation.hpp"
 #include "engine/options.hpp"
 #include "engine/solve/judge.hpp"
 #include "engine/step_report.hpp"
+#include "engine/sweeps/coupling_sweeps.hpp"
 #include "engine/sweeps/down_and_up.hpp"
 #include "engine/sweeps/strategy.hpp"
 #include "kernels/tree/articulated.hpp"
@@ -52,6 +55,18 @@ class TreeSweeps {
   const Workspace<double>& work() const { return work_; }
   const BodyConstants<double>& constants() const { return *constants_; }
   std::span<const Mimic> mimics() const { return ties_.mimics(); }
+  std::vector<CouplingState> couplings(double h) const;
+  /// Positions moved by the displacement in work(), and a refresh there.
+  void displace(Field<double>& q);
+  /// How far open couplings are at the positions of the last refresh.
+  Assembly openness();
+  /// After an evaluation or a refresh: of the row that is farthest open, its gap beside the size of its mechanism, the number of its coupling.
+  double widest_gap() const { return couplings_.widest_gap(); }
+  Index widest_coupling() const;
+  /// Velocities brought to the nearest, as the mass matrix measures, that leave couplings closed.
+  void close_velocities(Field<double>& v);
+  /// Closes them, or leaves them where they are least open; from the positions of the last refresh, which are brought to what is found.
+  Assembly assemble(Field<double>& q);
   EffectsIf<kEffects, double>& effects() { return effects_; }
   const EffectsIf<kEffects, double>& effects() const { return effects_; }
 
@@ -70,7 +85,10 @@ class TreeSweeps {
   void use_gravity(const std::array<double, 3>& gravity);
 
   /// Before all else of a step from these positions, which must stay where they are until it is over.
-  void start(const Field<double>& q) { q_ = &q; }
+  void start(const Field<double>& q) {
+    q_ = &q;
+    couplings_.begin();
+  }
   /// Before the evaluations of a step with effects. scale: what Evaluated::scale gets beside the energy.
   void begin(double scale);
   Evaluated<double> evaluate(Factor factor, StepReport& report);
@@ -97,9 +115,9 @@ class TreeSweeps {
   bool has_slopes() const { return options_.solver == Solver::newton && options_.stop == StopTest::energy; }
   /// r.(A^-1 r_before): the residual along a correction, r_before its own. Before the correction is made; after it, for the innovation there
   /// was before. Without ties the sum of u.(d^-1 u_before) over the joints, with the same factor.
-  double slope_at_begin() const { return ties_.empty() ? slope_along(work_.innovation) : along(work_.increment); }
+  double slope_at_begin() const { return !solves_with_residual() ? slope_along(work_.innovation) : along(work_.increment); }
   double slope_at_end(const Field<double>& innovation_before) const {
-    return ties_.empty() ? slope_along(innovation_before) : along(work_.applied);
+    return !solves_with_residual() ? slope_along(innovation_before) : along(work_.applied);
   }
   /// Whether the residual is rounding alone: epsilons of the impulses that meet at each joint, and small beside the motion, or beside what
   /// gravity alone would do to it where all is at rest (fall).
@@ -118,7 +136,7 @@ class TreeSweeps {
 
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
   void velocity_of(const Field<double>& p, Field<double>& v);
-  void apply_mass_inverse(const Field<double>& p, Field<double>& v);
+  void apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given = nullptr);
   /// What an impulse makes of velocities at a blow, as velocity_of.
   void response_to(const Field<double>& impulse, Field<double>& v);
   void momentum_of(const Field<double>& v, Field<double>& p);
@@ -160,10 +178,17 @@ class TreeSweeps {
   void pass_up(Evaluated<double>& now, Factor how);
   void factor();
   template <class Added>
-  void factor_mass(const Added& added);
+  void factor_mass(const Added& added, Coupled of = Coupled::velocities, double damping = 0);
+  void rates(Field<double>& v);
+  void complete_rates(Coupled of, Field<double>& v, const Field<double>* given = nullptr);
+  void factor_for_start(Coupled of, double damping = 0);
+  bool is_closed_to(double enough) const;
+  void close_gaps(double damping, Field<double>& q);
   template <class Added, class Action>
   void with_ties(const Added& added, const Action& action);
-  void tie_rates(const Gains<double>& gains);
+  void factor_couplings(Coupled of, const Gains<double>& gains, double damping = 0);
+  double give_way(Field<double, 6>* with);
+  void take_multipliers();
   template <class Down>
   void tie(const Gains<double>& gains, const Down& down);
   double pass_residual();
@@ -171,6 +196,8 @@ class TreeSweeps {
   double momenta_of_delta(Field<double>& momenta);
   double slope_along(const Field<double>& innovation_before) const;
   double along(const Field<double>& correction) const;
+  /// What ties joints makes the whole solve necessary for the norm.
+  bool solves_with_residual() const { return !ties_.empty(); }
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
   Gains<double> mass_gains() { return strategy_.reuses_factor ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
@@ -187,6 +214,7 @@ class TreeSweeps {
   std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;
+  CouplingSweeps<double> couplings_;
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
   DownAndUp<Evaluated<double>> tree_;
   Field<double> read_;  // see read_velocity

@@ -53,6 +53,19 @@ LINDEN_INLINE Wrench<S> bias_to_parent(Joint<Kind> joint, const Tree& tree, cons
   }
 }
 
+/// Sum of |u.(d^-1 u)| by itself, of what is left of the impulses.
+template <class S>
+S energy_norm(const Tree& tree, const Field<S>& inverse, const Field<S>& innovation) {
+  using std::abs;
+  S norm(0.0);
+  up(tree, [&](auto joint, Index i) {
+    const Wrench<S> u = load_joint(joint, innovation, tree.first_v(i));
+    const Wrench<S> given = apply_inverse(joint, inverse, tree.first_block(i), u);
+    norm = norm + abs(dot(u.n, given.n) + dot(u.f, given.f));
+  });
+  return norm;
+}
+
 template <class S, class Element>
 S impulse_pass_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
                   const Field<S>& residual, Field<S, 6>& bias, Field<S>& innovation) {

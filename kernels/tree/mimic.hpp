@@ -142,32 +142,40 @@ class MimicTies {
 
   /// Delta_0 -> Delta. Returns what the coordinates add to the squared energy norm of the residual, as impulse_pass_up has it.
   S complete(Field<S>& increment) {
-    const std::size_t k = leader_rows_.size();
     std::ranges::fill(pull_, S(0.0));
     for (const Member& member : members_) {
       S& pull = pull_[member.coordinate];
       pull = pull + as<S>(member.multiplier) * (as<S>(kHold<S>) * increment(member.row));
     }
     felt_now_ = pull_;
-    for (std::size_t i = 0; i < k; ++i) {
-      for (std::size_t j = 0; j < i; ++j) pull_[i] = pull_[i] - felt_[i * k + j] * pull_[j];
-    }
-    for (std::size_t i = k; i-- > 0;) {
-      for (std::size_t j = i + 1; j < k; ++j) pull_[i] = pull_[i] - felt_[i * k + j] * pull_[j];
-      pull_[i] = pull_[i] / felt_[i * k + i];
-    }
-    for (std::size_t c = 0; c < k; ++c) {
+    solve();
+    for (std::size_t c = 0; c < coordinates(); ++c) {
       for (Index row = 0; row < increment.rows(); ++row) increment(row) = increment(row) + pull_[c] * response_[c](row);
     }
     using std::abs;
     S norm(0.0);
-    for (std::size_t c = 0; c < k; ++c) {
+    for (std::size_t c = 0; c < coordinates(); ++c) {
       increment(leader_rows_[c]) = pull_[c];
       norm = norm + abs(felt_now_[c] * pull_[c]);
     }
     spread_mimics<S>(mimics_, increment);
     return norm;
   }
+  /// y of Z^T (r - A Delta_0), a number a coordinate.
+  const std::vector<S>& moved_by(std::span<const S> pulls) {
+    std::ranges::copy(pulls, pull_.begin());
+    solve();
+    return pull_;
+  }
+  /// visit(slot, row, multiplier, coordinate) of every joint that is tied.
+  template <class Visit>
+  void each_member(const Visit& visit) const {
+    for (const Member& member : members_) visit(member.slot, member.row, member.multiplier, member.coordinate);
+  }
+
+  std::size_t coordinates() const { return leader_rows_.size(); }
+  /// X_c of the factor there is.
+  const Field<S>& response(std::size_t c) const { return response_[c]; }
 
   /// visit(numbers) of all that a factor leaves here: numbers is a span.
   template <class Visit>
@@ -187,6 +195,18 @@ class MimicTies {
   }
 
  private:
+  /// T y = pull, in place.
+  void solve() {
+    const std::size_t k = coordinates();
+    for (std::size_t i = 0; i < k; ++i) {
+      for (std::size_t j = 0; j < i; ++j) pull_[i] = pull_[i] - felt_[i * k + j] * pull_[j];
+    }
+    for (std::size_t i = k; i-- > 0;) {
+      for (std::size_t j = i + 1; j < k; ++j) pull_[i] = pull_[i] - felt_[i * k + j] * pull_[j];
+      pull_[i] = pull_[i] / felt_[i * k + i];
+    }
+  }
+
   struct Member {
     Index slot, row, block;
     double multiplier;  // 1 of a leader

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "layout/support/words.hpp"
@@ -23,8 +26,7 @@ using Eigen::Vector3d;
 
 constexpr Index kMostBodies = 10'000'000;
 
-const Vector3d kBox(0.1, 0.02, 0.02);
-constexpr double kBoxMass = 0.1;
+const Vector3d kBox(kRodLength, kRodThickness, kRodThickness);
 
 LinkSpec box_link(Index i, Index parent, const Isometry3d& placement) {
   LinkSpec link;
@@ -32,7 +34,7 @@ LinkSpec box_link(Index i, Index parent, const Isometry3d& placement) {
   link.joint = fmt::format("joint{}", i);
   if (parent > 0) link.parent = fmt::format("link{}", parent);
   link.placement = placement;
-  link.inertia = box_inertia(kBoxMass, kBox, Vector3d(0.05, 0, 0));
+  link.inertia = box_inertia(kRodMass, kBox, Vector3d(kRodLength / 2, 0, 0));
   return link;
 }
 
@@ -207,25 +209,96 @@ bool is_generated(const std::string& name) {
   return colon != std::string::npos && name.find('/') == std::string::npos && name.find('.') == std::string::npos;
 }
 
-Model generate(const std::string& name) {
-  const std::size_t colon = std::min(name.find(':'), name.size());
-  const std::string kind = name.substr(0, colon);
-  const std::string number = colon < name.size() ? name.substr(colon + 1) : "";
-  Index count = 0;
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
-  if (error != std::errc{} || end != number.data() + number.size() || count < 1 || count > kMostBodies) {
-    throw InputError(fmt::format("model {}: {} is no number of bodies; expected 1 to {}; write for example chain:100",
-                                 quoted(name), quoted(number), kMostBodies));
+namespace {
+
+/// Models that are as large as one number says.
+struct GeneratedKind {
+  std::string_view name;
+  Model (*make)(Index);
+  Index least = 1;
+  double bodies = 1, rows = 0;  // of each that the number counts
+};
+constexpr GeneratedKind kGeneratedKinds[] = {
+    {"chain", chain},
+    {"ball-chain", ball_chain},
+    {"paper-chain", paper_chain},
+    {"tree", [](Index bodies) { return balanced_tree(bodies); }},
+    {"random", [](Index bodies) { return random_tree({.bodies = bodies}); }},
+    {"humanoids", humanoids, 1, kHumanoidBodies},
+    {"ring", hanging_ring, 3},
+    {"fourbars", four_bars, 1, 3, 5},
+    {"ladder", ladder, 1, 3, 5},
+};
+constexpr std::string_view kNet = "net";
+
+struct GeneratedName {
+  std::string_view kind, size;
+
+  const GeneratedKind* known() const {
+    const auto found = std::ranges::find(kGeneratedKinds, kind, &GeneratedKind::name);
+    return found == std::end(kGeneratedKinds) ? nullptr : found;
   }
-  if (kind == "chain") return chain(count);
-  if (kind == "paper-chain") return paper_chain(count);
-  if (kind == "ball-chain") return ball_chain(count);
-  if (kind == "tree") return balanced_tree(count);
-  if (kind == "random") return random_tree({.bodies = count});
-  if (kind == "humanoids") return humanoids(count);
-  throw InputError(fmt::format("model {}: {} cannot be generated; expected chain, ball-chain, paper-chain, tree, random or "
-                               "humanoids; choose one, or give a URDF file",
-                               quoted(name), quoted(kind)));
+  /// Before and after the x of a net.
+  std::pair<std::string_view, std::string_view> sides() const {
+    const std::size_t at = std::min(size.find('x'), size.size());
+    return {size.substr(0, at), size.substr(std::min(at + 1, size.size()))};
+  }
+};
+
+GeneratedName generated_parts(std::string_view name) {
+  const std::size_t colon = std::min(name.find(':'), name.size());
+  return {name.substr(0, colon), name.substr(std::min(colon + 1, name.size()))};
+}
+
+/// The number that the text is, all of it; zero where it is none.
+Index count_written(std::string_view text) {
+  Index count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  return error == std::errc{} && end == text.data() + text.size() ? count : 0;
+}
+
+Model net_of(const std::string& name, const GeneratedName& parts) {
+  const auto [ropes, knots] = parts.sides();
+  const Index across = count_written(ropes), along = count_written(knots);
+  if (across < 2 || along < 1 || across > kMostBodies || along > kMostBodies / across) {
+    throw InputError(fmt::format("model {}: {} is no size of a net; expected ropes x knots of each, two ropes or more, and no more than {} knots; "
+                                 "write for example net:4x6",
+                                 quoted(name), quoted(parts.size), kMostBodies));
+  }
+  return rope_net(across, along);
+}
+
+}  // namespace
+
+Model generate(const std::string& name) {
+  const GeneratedName parts = generated_parts(name);
+  if (parts.kind == kNet) return net_of(name, parts);
+  const GeneratedKind* kind = parts.known();
+  const Index count = count_written(parts.size), least = kind ? kind->least : 1;
+  if (count < least || count > kMostBodies) {
+    throw InputError(fmt::format("model {}: {} is no number of bodies; expected {} to {}; write for example {}:100", quoted(name),
+                                 quoted(parts.size), least, kMostBodies, kind ? kind->name : "chain"));
+  }
+  if (kind) return kind->make(count);
+  throw InputError(fmt::format("model {}: {} cannot be generated; expected chain, ball-chain, paper-chain, tree, random, humanoids, ring, "
+                               "fourbars, ladder or net; choose one, or give a URDF file",
+                               quoted(name), quoted(parts.kind)));
+}
+
+GeneratedSize generated_size(const std::string& name) {
+  const GeneratedName parts = generated_parts(name);
+  const auto number = [](std::string_view text) {
+    double value = 0;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return std::isnan(value) ? 0 : value;
+  };
+  if (parts.kind == kNet) {
+    const double knots = number(parts.sides().first) * number(parts.sides().second);
+    return {2 * knots, 3 * knots};
+  }
+  const GeneratedKind* kind = parts.known();
+  const double count = number(parts.size);
+  return kind ? GeneratedSize{kind->bodies * count, kind->rows * count} : GeneratedSize{};
 }
 
 }  // namespace linden

@@ -1,5 +1,5 @@
 // models/build/generators.hpp
-// Chains and trees of any size, made in code: the same ones for tests, benchmarks, examples and the command line.
+// Chains, trees and mechanisms of any size, made in code: the same ones for tests, benchmarks, examples and the command line.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,10 @@
 #include "layout/support/input_error.hpp"
 
 namespace linden {
+
+/// Of the boxes that most of them are made of.
+inline constexpr double kRodLength = 0.1, kRodThickness = 0.02;  // [m]
+inline constexpr double kRodMass = 0.1;                          // [kg]
 
 /// `links` boxes of 0.1 x 0.02 x 0.02 m and 0.1 kg along x, hinges every 0.1 m, axes alternating y and z. The base is turned by 45
 /// degrees about x so that gravity acts on both axes; at zero the chain is horizontal.
@@ -41,8 +45,34 @@ struct RandomTree {
 /// Random topology, placements, axes, masses and full inertias; the same tree for the same seed on every machine.
 Model random_tree(const RandomTree& recipe);
 
-/// "chain:100", "paper-chain:100", "ball-chain:100", "tree:1023", "random:50", "humanoids:3". Throws InputError for anything else.
+/// `rods` boxes of `chain` in a regular polygon in the xz plane, hinges about y; it hangs on the world by the first corner, where a hinge closes
+/// it. From three rods on; rods - 2 of its degrees of freedom are left.
+Model hanging_ring(Index rods);
+
+/// `count` four-bars along x, one carried by the coupler of the other, each with the loop of its own: a ground of 0.15 m and three boxes of
+/// `chain`, hinges about y. 3 count bodies, 5 count rows, count degrees of freedom left. No bar ever turns past the others: there are no change
+/// points.
+Model four_bars(Index count);
+
+/// Two rails of `cells` boxes of `chain` along x and rungs of half their size, hinges about y; it stands out from the world, with both rails
+/// pinned. The left rail is the trunk of the tree; the right one is closed by a hinge a cell. 3 cells bodies, 5 cells rows, cells degrees of
+/// freedom left.
+Model ladder(Index cells);
+
+/// `ropes` ball-chains of `knots` boxes along x, 0.1 m apart along y and held at one end, with boxes across between neighbours, tied by a ball
+/// coupling each. 2 ropes knots - knots bodies, 3 (ropes - 1) knots rows. From two ropes on.
+Model rope_net(Index ropes, Index knots);
+
+/// "chain:100", "paper-chain:100", "ball-chain:100", "tree:1023", "random:50", "humanoids:3", "ring:10", "fourbars:3", "ladder:5", "net:4x6".
+/// Throws InputError for anything else. Couplings take memory and time that grow with the square of their rows and more: several hundred rows
+/// take long.
 Model generate(const std::string& name);
+
+/// About how large the model of this name is; zeros where the name is none, or holds no number.
+struct GeneratedSize {
+  double bodies = 0, rows = 0;  // rows: of couplings
+};
+GeneratedSize generated_size(const std::string& name);
 
 /// Whether `name` has the form of a generated model, as against a file.
 bool is_generated(const std::string& name);

@@ -185,6 +185,12 @@ class Merger {
     }
   }
 
+  static Index slot_of_row(const Tree& tree, Index v_row) {
+    Index slot = 1;
+    while (tree.first_v(slot) != v_row) ++slot;
+    return slot;
+  }
+
   /// What is fixed to a model's world becomes part of what that is.
   void add_welded(std::size_t part) {
     const Index slot = carrying_slot(part, 0);
@@ -245,6 +251,19 @@ class Merger {
       const Tree& tree = model_.tree;
       model_.mimics.push_back({follower, leader, tree.first_v(follower), tree.first_v(leader), tree.first_q(follower),
                                tree.first_q(leader), mimic.multiplier, mimic.offset});
+    }
+    for (Coupling coupling : from.couplings) {
+      coupling.name = prefixed(part, coupling.name);
+      for (const auto& [slot, frame] : {std::pair(&coupling.slot_a, &coupling.frame_a), std::pair(&coupling.slot_b, &coupling.frame_b)}) {
+        if (*slot == 0 && coupling.kind != CouplingKind::gear) *frame = pose_of(ground_[part].pose * isometry(*frame));
+        *slot = carrying_slot(part, *slot);
+      }
+      for (GearTerm& term : coupling.terms) {
+        const Index slot = slot_of(part, slot_of_row(from.tree, term.v_row));
+        term.q_row = model_.tree.first_q(slot);
+        term.v_row = model_.tree.first_v(slot);
+      }
+      model_.couplings.push_back(std::move(coupling));
     }
     const auto said = [&](const std::string& text) { return parts_[part].name.empty() ? text : parts_[part].name + ": " + text; };
     for (const std::string& warning : from.warnings) model_.warnings.push_back(said(warning));

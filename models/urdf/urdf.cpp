@@ -238,7 +238,7 @@ Model parse_urdf(const std::string& xml, const std::string& source_name, Base ba
     builder.note(mass->note());
   }
   const bool mesh_missing = mass && !mass->troubles().empty();
-  Model model = built(builder, mesh_missing ? mass->troubles().front() : checked.suspect);
+  Model model = with_loops(built(builder, mesh_missing ? mass->troubles().front() : checked.suspect), checked.loops, source_name);
   if (reading == Reading::strict) refuse_warnings(model);
   return model;
 }

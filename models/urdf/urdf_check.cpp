@@ -251,6 +251,7 @@ CheckedUrdf check_urdf(const std::string& xml, const std::string& source_name, b
     if (std::vector<LinkVisual> seen = visuals.of(link, give_mass); !seen.empty()) result.visuals[link.name] = std::move(seen);
   }
   result.visual_faults = visuals.faults();
+  result.loops = loops_of(robot, report);
   for (const UrdfJoint& joint : robot.joints()) result.joints.push_back(joint.name);
   result.warnings = std::move(report.warnings);
   result.suspect = std::move(report.suspect);

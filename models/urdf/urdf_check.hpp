@@ -8,8 +8,8 @@
 // The text written here has none of these: links with their <inertial>; joints with origin, parent, child, axis, limit,
 // mimic and dynamics; every number in the shortest form that reads back to the same double. Collision shapes do not pass through
 // urdfdom, which knows no capsules: they are read here (models/urdf/urdf_shapes.hpp), and so are visuals and materials
-// (models/urdf/urdf_visuals.hpp). Sensors, transmissions and unknown elements are left out, and what of them a reader should know is told
-// (models/urdf/urdf_vocabulary.hpp).
+// (models/urdf/urdf_visuals.hpp) and closed loops (models/urdf/urdf_loops.hpp). Sensors, transmissions and unknown elements are left out, and
+// what of them a reader should know is told (models/urdf/urdf_vocabulary.hpp).
 //
 //   what the file says                              what becomes of it
 //   revolute or prismatic joint without limits      unlimited, with a warning
@@ -30,6 +30,7 @@
 #include <vector>
 
 #include "layout/shapes.hpp"
+#include "models/urdf/urdf_loops.hpp"
 
 namespace linden {
 
@@ -41,6 +42,7 @@ struct CheckedUrdf {
   std::vector<std::string> joints;    // names in the order of the file, which urdfdom forgets
   std::unordered_map<std::string, std::vector<LinkShape>> shapes;  // of the links that have any
   std::unordered_map<std::string, std::vector<LinkVisual>> visuals;  // the same
+  std::vector<UrdfLoop> loops;        // that are understood
   std::vector<std::string> visual_faults;  // what is wrong about visuals, in the form of warnings
   std::vector<std::string> warnings;  // `file:line: what was found; how it is read`
   std::string suspect;                // of a slip in a word, which later errors may come from; may be empty

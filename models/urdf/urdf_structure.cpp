@@ -166,7 +166,7 @@ void UrdfStructure::join(UrdfJoint& joint) {
     report_.fail(line,
                  fmt::format("link {} is the child of two joints, {} in line {} and {}", quoted(child.name),
                              quoted(first.name), first.element->GetLineNum(), quoted(joint.name)),
-                 "one joint above every link", "delete one of the two; closed loops are no trees");
+                 "one joint above every link", "delete one of the two, or make it a <loop_joint>, which closes a loop");
   }
   child.joint = static_cast<int>(&joint - joints_.data());
 }
@@ -197,7 +197,7 @@ void UrdfStructure::require_one_tree() {
                      link(this->joint(start.joint).parent).name == start.name
                          ? fmt::format("link {} hangs from itself", names)
                          : fmt::format("the links {} hang from each other in a loop", names),
-                     "a tree that starts at one root link", "cut the loop at one joint");
+                     "a tree that starts at one root link", "make one of the joints a <loop_joint>, which closes the loop");
       });
   const UrdfLink* root = nullptr;
   for (const UrdfLink& link : links_) {

@@ -59,6 +59,7 @@ class UrdfStructure {
   UrdfStructure(std::string xml, UrdfReport& report);
 
   const std::string& name() const { return name_; }
+  const tinyxml2::XMLElement& robot() const { return *robot_; }
   const std::vector<UrdfLink>& links() const { return links_; }     // in the order of the file
   const std::vector<UrdfJoint>& joints() const { return joints_; }  // in the order of the file
   const UrdfLink& link(int index) const { return links_[static_cast<std::size_t>(index)]; }

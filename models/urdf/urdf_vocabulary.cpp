@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "layout/support/words.hpp"
+#include "models/urdf/urdf_loops.hpp"
 
 namespace linden {
 namespace {
@@ -56,14 +57,19 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"safety_controller", "joint",                           no_motion, one,
      "soft_lower_limit soft_upper_limit k_position k_velocity", ""},
 
-    {"loop_joint",        "robot",                           lost,      many,       "",                            ""},
+    {"loop_joint",        "robot",                           loops,     many,       "",                            ""},
+    {"loop",              "robot",                           loops,     many,       "",                            ""},
+    {"drake:ball_constraint",    "robot",                    loops,     many,       "",                            ""},
+
+    {"coupling",          "robot",                           lost,      many,       "",                            ""},
     {"cable",             "robot",                           lost,      many,       "",                            ""},
     {"force_element",     "robot",                           lost,      many,       "",                            ""},
     {"spring",            "robot joint",                     lost,      many,       "",                            ""},
     {"traits",            "joint",                           lost,      many,       "",                            ""},
     {"joint_properties",  "joint",                           lost,      many,       "",                            ""},
     {"drake:linear_bushing_rpy", "robot",                    lost,      many,       "",                            ""},
-    {"drake:ball_constraint",    "robot",                    lost,      many,       "",                            ""},
+    {"drake:linear_spring_damper", "robot",                  lost,      many,       "",                            ""},
+    {"drake:tendon_constraint",  "robot",                    lost,      many,       "",                            ""},
     {"drake:mimic",       "joint",                           lost,      many,       "",                            ""},
     {"contact",           "link",                            lost,      many,       "",                            ""},
     {"gravity",           "link",                            lost,      many,       "",                            ""},
@@ -224,10 +230,17 @@ class Walk {
         tell_misplaced(*child, element, *child_row, owner);
       } else if (child_row->element->use == lost) {
         refuse_macros_within(*child);
-        const auto words = [&] { return Words{fmt::format("known but not simulated: <{}>", shown(child->Name())), kWithout}; };
+        const bool stands_for_a_joint = std::string_view(child->Name()) == "drake:linear_bushing_rpy";
+        const auto words = [&] {
+          return Words{fmt::format("known but not simulated: <{}>", shown(child->Name())),
+                       stands_for_a_joint ? fmt::format("{}; where it closes a loop, write a <drake:ball_constraint> or a <loop_joint>", kWithout) : kWithout};
+        };
         tell(*child, "lost", row, "", owner, words);
+      } else if (child_row->element->use == loops) {
+        refuse_macros_within(*child);
       } else if (child_row->element->use == others) {
         refuse_macros_within(*child);
+        if (row.element->name == "robot" && holds_joints_only(*child)) continue;
         const auto at = extensions_.try_emplace(shown(child->Name()), Extension{child->GetLineNum()}).first;
         at->second.count += 1;
       } else {

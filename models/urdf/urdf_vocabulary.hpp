@@ -6,8 +6,9 @@
 //   <inertail>, pos="0 0 1"              not known; the nearest known word is named
 //   <origin> within <child>              known, but elsewhere
 //   a second <inertial>                  the first is used
-//   <loop_joint>, armature="0.1"         known, and not simulated
+//   <spring>, armature="0.1"             known, and not simulated
 //   <gazebo>, <transmission>, <sensor>   the business of other programs; all of them in one warning
+//   <loop_joint>, <joint> in <gazebo>    closed loops: what of them is not used is told by models/urdf/urdf_loops.hpp
 //   text between the tags                not read
 //
 // Equal findings are one warning, with their number. Where a file gives none, all of it was used, or belongs to URDF and moves nothing:
@@ -33,6 +34,7 @@ enum class UrdfUse : std::uint8_t {
   no_motion, // belongs to URDF and has no effect on motion
   lost,      // would have an effect, and is not simulated
   others,    // an extension that other programs read; not looked into
+  loops,     // read, and what is in it looked at, by urdf_loops.hpp
   macro      // to be expanded by xacro before the file is URDF
 };
 

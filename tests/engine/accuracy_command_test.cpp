@@ -178,6 +178,21 @@ TEST_CASE("a scene that loses energy smoothly is judged against RK4 and order 2 
   CHECK(ladder(json, "RK4")[6]["energy_band"].is_null());
 }
 
+TEST_CASE("a mechanism is judged by orders 8 and 6, since RK4 moves trees alone", "[command line]") {
+  const Shell shell;
+  const Outcome outcome = shell.linden("accuracy " LINDEN_MODELS_DIR "/scenes/four_bar.yaml --duration 0.64 --dt 4e-3 --budget 60 --json a.json");
+  REQUIRE(outcome.exit_code == 0);
+  CHECK_THAT(outcome.out, Contains("3 degrees of freedom but for 1 coupling") && Contains("order 8") && Contains("agree to") && Contains("over all 0.64 s"));
+  const nlohmann::json json = json_of(shell / "a.json");
+  CHECK(json["reference"]["gap"] < 1e-9);
+  CHECK(ladder(json, "RK4").empty());
+  for (const nlohmann::json& fit : json["fits"]) {
+    if (fit["method"] != "order 2" && fit["method"] != "order 4") continue;
+    INFO(fit);
+    CHECK(fit["order"].get<double>() == Approx(fit["nominal_order"].get<double>()).margin(0.3));
+  }
+}
+
 TEST_CASE("a scene with contacts is judged against itself at a smaller step, and says so", "[command line]") {
   const Shell shell;
   shell.write("s.yaml",

@@ -253,7 +253,7 @@ TEST_CASE("instances that cannot be are refused though the checksum is right", "
   batch.step(4);
   const std::string good = batch.checkpoint();
   const std::size_t header = good.find('\n') + 1, first = header + 96, of_each = (good.size() - 8 - first) / 3;
-  const std::size_t record = 4 + 1 + 4 + 4 + 4 + 8 + 8 + 8, factor = 4 * (2 * 12 + 2) + 8 * 4;
+  const std::size_t record = 4 + 1 + 4 + 4 + 4 + 4 + 8 + 8 + 8, factor = 4 * (2 * 12 + 2) + 8 * 4;
   REQUIRE(of_each == 8 * (2 + 2 + 2) + factor + record);
   const auto message_with = [&](std::size_t at, auto value) -> std::string {
     std::string bytes = good.substr(0, good.size() - 8);
@@ -272,6 +272,7 @@ TEST_CASE("instances that cannot be are refused though the checksum is right", "
   CHECK_THAT(message_with(its_record, 99), Catch::Contains("the status 99 of instance 1"));
   CHECK_THAT(message_with(its_record + 4, std::int8_t{3}), Catch::Contains("the displacements of 3 steps of instance 1"));
   CHECK_THAT(message_with(its_record + 5, Index{-1}), Catch::Contains("the body -1 of instance 1"));
+  CHECK_THAT(message_with(its_record + 9, Index{1}), Catch::Contains("the coupling 1 of instance 1"));
   CHECK_THAT(message_with(header + 88, std::int64_t{1} << 40), Catch::Contains("bytes about effects"));
   CHECK_THAT(message_with(header + 80, std::int64_t{0}), Catch::Contains("other rows than an instance has"));
   CHECK(batch.checkpoint() == good);

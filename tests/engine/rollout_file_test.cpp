@@ -115,7 +115,7 @@ TEMPLATE_TEST_CASE("a rollout reads back to the same bits, for any number of fra
       }
       CHECK(arrays["positions"].words == names.position);
       CHECK(arrays["velocities"].words == names.velocity);
-      const std::vector<std::string> statuses{"converged", "not_converged", "past_pi", "gains_energy", "not_finite"};
+      const std::vector<std::string> statuses{"converged", "not_converged", "past_pi", "gains_energy", "not_finite", "opens"};
       CHECK(arrays["statuses"].words == statuses);
     }
   }
@@ -423,7 +423,7 @@ TEMPLATE_TEST_CASE("Python opens a rollout in one line", "", float, double) {
                     module, open, names[k]);
     const std::string real = std::is_same_v<TestType, float> ? "float32" : "float64";
     const std::string expected = fmt::format(
-        "('float64', (4,)) ('{0}', (4, 3, 6)) ('{0}', (4, 3, 5)) ('{0}', (4, 3)) ('uint8', (4, 3))\n{1} '\\u3072\\u3058' 5\n", real,
+        "('float64', (4,)) ('{0}', (4, 3, 6)) ('{0}', (4, 3, 5)) ('{0}', (4, 3)) ('uint8', (4, 3))\n{1} '\\u3072\\u3058' 6\n", real,
         static_cast<double>(Frame<TestType>(3).q[17]));
     std::ofstream(folder.file("script.py")) << script;
     CHECK(output_of(fmt::format("{} '{}' '{}' 2>&1", python, folder.file("script.py"), name)) == expected);

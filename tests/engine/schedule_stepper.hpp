@@ -78,11 +78,13 @@ class ScheduleStepper {
   }
   Lanes at_floor(const Evaluated<double>& now, double epsilons) {
     REQUIRE_FALSE(memory.strategy.shares_rows);  // there all bodies would be evaluated once more for this
+    const double of_gaps = memory.couplings.rounding();
+    if (!memory.couplings.empty() && is_rounding(now.norm, of_gaps, epsilons)) return 1;
     if (!below_ceiling(now.norm, now.energy, fall())) return 0;
     const Field<double>& inverse = memory.work.joint_inverse;
     const Field<double>& yields = memory.ties.empty() ? inverse : memory.ties.yields(inverse);
     const double sum = rounding_floor_map(memory.model.tree, memory.constants, memory.work.momentum_target, memory.work.impulse, yields);
-    return is_rounding(now.norm, sum, epsilons) ? 1 : 0;
+    return is_rounding(now.norm, sum + of_gaps, epsilons) ? 1 : 0;
   }
   bool has_states() const { return memory.plan.has_states; }
   Lanes update_states(const StateUpdate<bool>& update) {
@@ -134,7 +136,7 @@ class ScheduleStepper {
     const Slots all = all_slots(memory.model.tree);
     for (const Sweep& sweep : list_) {
       if (std::ranges::find(phases, sweep.when) == phases.end()) continue;
-      if (refactors_ && sweep.name == "displacement_down") continue;          // they are there
+      if (refactors_ && (sweep.name == "displacement_down" || sweep.name == "couplings: take multipliers")) continue;  // they are there
       if (cuts_ && sweep.name != "correct_motion_map") continue;              // the correction is there
       if (call) {
         call(sweep, all);

@@ -10,6 +10,8 @@
 #include "engine/effects/effect_sweeps.hpp"
 #include "engine/sweeps/sweep_cost.hpp"
 #include "models/build/builder.hpp"
+#include "models/build/merged_models.hpp"
+#include "tests/engine/mechanisms.hpp"
 #include "tests/engine/scenes.hpp"
 #include "tests/engine/schedule_stepper.hpp"
 #include "tests/kernels/allocation_counter.hpp"
@@ -78,11 +80,28 @@ Scenario bodies_scenario(double friction) {
   return scenario;
 }
 
+/// A four-bar, a gear from its crank to a joint of a hand whose joints follow each other, and friction.
+Scenario geared_loop_scenario() {
+  const Model linkage = four_bar(CouplingKind::hinge), hand = load_urdf(model_file("hand.urdf"), Base::fixed);
+  Model both = merged({{.model = linkage, .name = "linkage"}, {.model = hand, .name = "hand"}}, "linkage and hand");
+  const auto leader = static_cast<std::size_t>(both.mimics.front().leader_slot);
+  const std::string led = both.names.joint[leader];
+  Scenario scenario{.name = "a loop and a gear beside joints that follow others",
+                    .model = coupled(std::move(both), {{.name = "gear", .kind = CouplingKind::gear, .link_a = {}, .link_b = {}, .joints = {{"linkage/crank_joint", 1}, {led, -2}}}})};
+  scenario.effects.friction = {{.row = scenario.model.tree.first_v(static_cast<Index>(leader)), .force = 1e-3}};
+  scenario.positions = scenario.model.neutral();
+  scenario.velocities.assign(static_cast<std::size_t>(scenario.model.tree.shape.velocities), 0.0);
+  scenario.velocities[0] = 0.5;
+  return scenario;
+}
+
 std::vector<Scenario> scenarios() {
   std::vector<Scenario> all{{"chain", chain(12)},
                             {"floating humanoid", load_urdf(model_file("humanoid.urdf"), Base::floating)},
                             {"all kinds of joints", random_tree({.bodies = 30, .seed = 5, .floating = true})},
                             {"joints that follow others", load_urdf(model_file("hand.urdf"), Base::fixed)},
+                            {.name = "a loop", .model = four_bar(CouplingKind::hinge), .positions = {0, 0, 0}, .velocities = {1, 0, 0}},
+                            geared_loop_scenario(),
                             joints_scenario(),
                             bodies_scenario(0),
                             bodies_scenario(0.5)};

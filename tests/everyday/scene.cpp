@@ -10,6 +10,7 @@
 
 #include "layout/contacts.hpp"
 #include "models/build/builder.hpp"
+#include "models/build/coupled_model.hpp"
 #include "models/build/random.hpp"
 #include "models/shapes/contacts_of.hpp"
 #include "tests/reference/plain_scene.hpp"
@@ -48,6 +49,7 @@ class Maker {
     }
     make_model();
     make_start();
+    if (scene_.number % 6 == 4) make_couplings();
     measure();
     make_effects();
     choose_length();
@@ -178,6 +180,105 @@ class Maker {
     }
   }
 
+  /// Bodies are tied to each other, or to the world, as they stand at the start: as many rows as leave a coordinate or two free; now and then
+  /// one coupling twice, whose rows follow from each other. Numbers of its own, so that all else is as it would be without.
+  void make_couplings() {
+    Random random(scene_.seed * 32452843 + scene_.number);
+    const Index bodies = model().tree.bodies();
+    Index free = model().degrees_of_freedom() - 1;
+    std::vector<CouplingSpec> specs;
+    const std::vector<Isometry> poses = poses_at_start();
+    const auto couple = [&](CouplingKind kind, Index a, Index b) {
+      CouplingSpec spec;
+      spec.name = fmt::format("coupling{}", specs.size() + 1);
+      spec.kind = kind;
+      spec.link_a = a == 0 ? "world" : model().names.body[static_cast<std::size_t>(a)];
+      spec.link_b = model().names.body[static_cast<std::size_t>(b)];
+      Isometry where = Isometry::Identity();
+      where.linear() = random.rotation().toRotationMatrix();
+      where.translation() = poses[static_cast<std::size_t>(b)] * Vector3d(random.uniform(0, 0.3), random.uniform(-0.1, 0.1), 0);
+      Isometry other = where;
+      if (kind == CouplingKind::rod) {
+        const Vector3d apart = random.uniform(0.1, 0.5) * (random.rotation() * Vector3d::UnitZ());
+        other.translation() += apart;
+        spec.length = apart.norm();
+      }
+      const auto in_link = [&](Index slot, const std::string& link, const Isometry& frame) {
+        const Isometry in_body = slot == 0 ? Isometry(Isometry::Identity()) : isometry(model().names.link.at(link).in_body);
+        return Isometry((poses[static_cast<std::size_t>(slot)] * in_body).inverse() * frame);
+      };
+      spec.frame_a = in_link(a, spec.link_a, other);
+      spec.frame_b = in_link(b, spec.link_b, where);
+      specs.push_back(spec);
+    };
+    for (int tries = 0; tries < 6 && specs.size() < 3; ++tries) {
+      const auto kind = static_cast<CouplingKind>(random.below(kCouplingKinds));
+      const auto rows = static_cast<Index>(rows_of(kind).size());
+      const auto a = static_cast<Index>(random.below(static_cast<std::uint64_t>(bodies) + 1));
+      const auto b = static_cast<Index>(1 + random.below(static_cast<std::uint64_t>(bodies)));
+      const auto is_link = [&](Index slot) { return slot == 0 || model().names.link.contains(model().names.body[static_cast<std::size_t>(slot)]); };
+      if (a == b || rows > free || !is_link(a) || !is_link(b)) continue;
+      if (kind == CouplingKind::gear) {
+        CouplingSpec spec;
+        spec.name = fmt::format("coupling{}", specs.size() + 1);
+        spec.kind = kind;
+        each_screw([&](Index slot, Index) {
+          const std::string& name = model().names.joint[static_cast<std::size_t>(slot)];
+          if (random.uniform(0, 1) < 0.5 || spec.joints.size() == 3 || !model().names.slot_of_joint.contains(name)) return;
+          const double ratio = (random.uniform(0, 1) < 0.5 ? 1 : -1) * random.uniform(0.3, 2);
+          spec.joints.push_back({name, ratio});
+          spec.offset -= ratio * position_of(slot);
+        });
+        if (spec.joints.size() < 2) continue;
+        specs.push_back(spec);
+        free -= 1;
+        continue;
+      }
+      couple(kind, a, b);
+      free -= rows;
+      if (random.uniform(0, 1) < 0.15) {
+        specs.push_back(specs.back());
+        specs.back().name = fmt::format("coupling{}", specs.size());
+      }
+    }
+    if (specs.empty()) return;
+    auto tied = std::make_shared<const Model>(coupled(*scene_.model, specs));
+    if (starts_singular(*tied, random)) return;
+    scene_.model = std::move(tied);
+    scene_.coupled = true;
+  }
+
+  /// Whether rows of couplings follow from each other at the start that do not elsewhere: a structure that gives way there at first, and then
+  /// no more.
+  bool starts_singular(const Model& tied, Random& random) const {
+    const reference::PlainTree tree = reference::plain_tree(tied);
+    const reference::PlainCouplings couplings(tree, tied.couplings);
+    const auto rank = [&](const VectorXd& q) {
+      Eigen::MatrixXd C = couplings.opening(q);
+      for (const Mimic& mimic : tied.mimics) {
+        C.col(mimic.leader_v) += mimic.multiplier * C.col(mimic.follower_v);
+        C.col(mimic.follower_v).setZero();
+      }
+      Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor;
+      factor.setThreshold(1e-6);
+      return factor.compute(C).rank();
+    };
+    const VectorXd start = Eigen::Map<const VectorXd>(scene_.start.positions.data(), static_cast<Eigen::Index>(scene_.start.positions.size()));
+    VectorXd away(tree.velocities);
+    for (double& moved : away) moved = random.uniform(-0.5, 0.5);
+    return rank(start) < rank(reference::advanced(tree, start, away));
+  }
+
+  std::vector<Isometry> poses_at_start() const {
+    const reference::PlainScene scene = plain();
+    std::vector<Isometry> all;
+    for (const reference::Matrix4<double>& pose : reference::poses(scene.tree(), scene.q)) {
+      all.push_back(Isometry::Identity());
+      all.back().matrix() = pose;
+    }
+    return all;
+  }
+
   reference::PlainScene plain() const {
     reference::PlainScene result(model(), scene_.effects, scene_.options.gravity);
     result.start(Eigen::Map<const VectorXd>(scene_.start.positions.data(), static_cast<Eigen::Index>(scene_.start.positions.size())),
@@ -239,7 +340,8 @@ class Maker {
     if (on_ground()) make_ground();
   }
 
-  /// A joint is moved: held, to and fro, or on its way now and then. Numbers of its own, so that all else is as it would be without.
+  /// A joint is moved: held, to and fro, or on its way now and then; only held where couplings leave a coordinate or two, which can follow no
+  /// farther than they reach. Numbers of its own, so that all else is as it would be without.
   void make_motion() {
     std::vector<std::pair<Index, Index>> screws;
     each_screw([&](Index slot, Index row) { screws.push_back({slot, row}); });
@@ -250,7 +352,7 @@ class Maker {
     double& v = scene_.start.velocities[static_cast<std::size_t>(row)];
     JointMotion motion{row, {{0}, {q}}};
     TimeTable& table = motion.position;
-    const double kind = random.uniform(0, 1), apart = h_ * 2 * std::pow(10.0, random.uniform(0, 1));
+    const double kind = scene_.coupled ? 0 : random.uniform(0, 1), apart = h_ * 2 * std::pow(10.0, random.uniform(0, 1));
     const double w = random.uniform(0.02, 0.3) / apart, size = random.uniform(0.2, 1) * std::min(slides(slot) ? 0.1 : 0.8, (slides(slot) ? 0.5 : 3.0) / w);
     const double phase = random.uniform(0, 2 * std::numbers::pi);
     const bool with_velocities = kind > 0.2 && kind <= 0.4;

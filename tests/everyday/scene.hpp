@@ -31,6 +31,7 @@ struct EverydayScene {
   bool stiff = false;        // a rate of it is faster than the step: it must be stable, but is not compared at this step
   bool bends = false;        // forces that jump or bend between steps
   bool sudden = false;       // friction, limits or ground
+  bool coupled = false;      // bodies are tied that are no neighbours in the tree
   bool rough = false;        // the ground is a terrain, which the plain simulator does not know
   std::string kind;          // what it is mostly about
 

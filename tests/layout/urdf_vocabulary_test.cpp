@@ -139,8 +139,8 @@ TEST_CASE("what is wrong in a word is told with its line, once, and the nearest 
        "test.urdf:3: link \"b\": <box> beside <sphere> within <geometry>; the first, in line 3, is used"},
       {"text", hinge("<origin>0 0 1</origin>"),
        "test.urdf:4: joint \"j\": the text \"0 0 1\" within <origin> is not read; URDF has its numbers and names in attributes"},
-      {"loop joint", hinge("", "", "<loop_joint name=\"l\"><link1 link=\"a\"/></loop_joint>"),
-       "test.urdf:5: known but not simulated: <loop_joint>; the robot moves as if it were not there"},
+      {"cable", hinge("", "", "<cable name=\"l\"><link1 link=\"a\"/></cable>"),
+       "test.urdf:5: known but not simulated: <cable>; the robot moves as if it were not there"},
       {"armature", hinge("<dynamics armature=\"0.1\" damping=\"1\" spring_stiffness=\"2\"/>"),
        "test.urdf:4: joint \"j\": known but not simulated: armature, spring_stiffness of <dynamics>; "
        "the robot moves as if it were not there"},

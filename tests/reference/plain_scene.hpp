@@ -18,6 +18,7 @@
 
 #include <memory>
 
+#include "tests/reference/plain_couplings.hpp"
 #include "tests/reference/plain_curve.hpp"
 #include "tests/reference/plain_forces.hpp"
 
@@ -48,6 +49,7 @@ class PlainScene {
       q[mimic.follower_q] = mimic.multiplier * q[mimic.leader_q] + mimic.offset;
       v[mimic.follower_v] = mimic.multiplier * v[mimic.leader_v];
     }
+    close_gaps();
   }
 
   /// On by `duration`, in so many steps or a few more.
@@ -126,7 +128,7 @@ class PlainScene {
  private:
   struct Fixed {
     Fixed(const Model& model, const Effects& given, const std::array<double, 3>& g)
-        : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g) {
+        : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g), couplings(tree, model.couplings) {
       std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.velocities), nullptr);
       for (const Mimic& mimic : mimics) follows[static_cast<std::size_t>(mimic.follower_v)] = &mimic;
       Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom() - static_cast<Index>(effects.motions.size()));
@@ -163,6 +165,7 @@ class PlainScene {
     std::vector<Mimic> mimics;
     Vector3d gravity;
     PlainForces forces;
+    PlainCouplings couplings;
     MatrixXd Z, G;  // [nv x u], [nv x w]
     std::vector<std::pair<Index, PlainCurve>> moved;  // by row
     std::vector<double> breaks;  // times at which a force jumps or bends [s]
@@ -188,7 +191,32 @@ class PlainScene {
     const MatrixXd M = mass_matrix_at(motions), & Z = fixed_->Z;
     const VectorXd given = fixed_->G * given_derivatives(2, within(t));
     const VectorXd force = fixed_->forces.force(at, rate, within(t), motions, true) - bias_force(tree(), motions) - M * given;
-    return given + Z * (Z.transpose() * M * Z).ldlt().solve(Z.transpose() * force);
+    const Eigen::LDLT<MatrixXd> A(Z.transpose() * M * Z);
+    VectorXd u = A.solve(Z.transpose() * force);
+    if (!fixed_->couplings.empty()) {
+      const MatrixXd C = fixed_->couplings.opening(at), CZ = C * Z, response = A.solve(CZ.transpose());
+      u -= response * PlainCouplings::multipliers(CZ * response, CZ * u + C * given + fixed_->couplings.bend(at, rate), moved_freely(C, M));
+    }
+    return given + Z * u;
+  }
+
+  /// Positions and velocities back onto the gaps, as near as the mass matrix measures.
+  void close_gaps() {
+    if (fixed_->couplings.empty()) return;
+    const MatrixXd& Z = fixed_->Z;
+    const auto moved_by = [&](const VectorXd& opens) {
+      const MatrixXd C = fixed_->couplings.opening(q), CZ = C * Z, M = mass_matrix();
+      const MatrixXd response = (Z.transpose() * M * Z).ldlt().solve(CZ.transpose());
+      return VectorXd(Z * (response * PlainCouplings::multipliers(CZ * response, opens, moved_freely(C, M))));
+    };
+    for (int round = 0; round < 2; ++round) q = advanced(tree(), q, -moved_by(fixed_->couplings.gaps(q)));
+    v -= moved_by(fixed_->couplings.opening(q) * v);
+  }
+
+  /// For PlainCouplings::multipliers; what no joint moves at all is rounding.
+  static VectorXd moved_freely(const MatrixXd& C, const MatrixXd& M) {
+    const VectorXd moved = (C * M.ldlt().solve(C.transpose())).diagonal();
+    return moved.cwiseMax(1e-10 * moved.maxCoeff());
   }
 
   VectorXd given_derivatives(int order, double t) const {
@@ -243,6 +271,7 @@ class PlainScene {
       if (!fixed_->forces.sudden(ahead, rate, body_motions(tree(), ahead, rate))) {
         q = ahead;
         v = rate;
+        close_gaps();
         return;
       }
     }
@@ -266,12 +295,23 @@ class PlainScene {
       given[static_cast<Eigen::Index>(j)] = (curve.derivative(0, begin + dt) - fixed_->forces.position(q, row)) / dt - v[row];
     }
     const VectorXd taken_along = fixed_->G * given;
-    VectorXd after = v + taken_along + Z * A.solve(Z.transpose() * (dt * force - M * taken_along));
+    // what an impulse makes of velocities, couplings holding
+    const MatrixXd C = fixed_->couplings.opening(q), coupled = Z * A.solve(Z.transpose() * C.transpose());
+    const VectorXd free = fixed_->couplings.empty() ? VectorXd() : moved_freely(C, M);
+    const auto close = [&](auto&& velocity) { velocity -= coupled * PlainCouplings::multipliers(C * coupled, C * velocity, free); };
+    const auto responses_to = [&](const MatrixXd& impulses) {
+      MatrixXd change = Z * A.solve(Z.transpose() * impulses);
+      if (fixed_->couplings.empty()) return change;
+      for (Eigen::Index column = 0; column < change.cols(); ++column) close(change.col(column));
+      return change;
+    };
+    VectorXd after = v + taken_along + responses_to(dt * force - M * taken_along);
+    if (!fixed_->couplings.empty()) close(after);
     const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, t, dt);
     if (!rows.empty()) {
       MatrixXd W(static_cast<Eigen::Index>(rows.size()), tree().velocities);
       for (std::size_t r = 0; r < rows.size(); ++r) W.row(static_cast<Eigen::Index>(r)) = rows[r].J;
-      const MatrixXd response = Z * A.solve(Z.transpose() * W.transpose());
+      const MatrixXd response = responses_to(W.transpose());
       const VectorXd lambda = impulses(rows, W * response, W * after);
       after += response * lambda;
       for (std::size_t r = 0; r < rows.size(); ++r) {
@@ -280,6 +320,7 @@ class PlainScene {
       }
     }
     move(0.5 * (v + after), after, dt);
+    close_gaps();
   }
 
   /// Joints end where their limits were asked, with the velocity that they end with; what turns freely goes on by the mean of both.

@@ -1,0 +1,109 @@
+#include "engine/scene/scene_couplings.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "engine/scene/scene_start.hpp"
+#include "models/build/coupled_model.hpp"
+#include "models/build/vectors.hpp"
+
+namespace linden {
+namespace {
+
+const std::vector<std::string> kBodyKeys{"type", "name", "between", "point", "axis", "second_axis", "frames"};
+const std::vector<std::string> kRodKeys{"type", "name", "between", "points", "length"};
+const std::vector<std::string> kGearKeys{"type", "name", "joints", "offset"};
+const std::vector<std::string> kAllKeys{"type", "name", "between", "point", "axis", "second_axis", "frames", "points", "length", "joints", "offset"};
+const std::vector<std::string> kFrameKeys{"position", "rotation", "quaternion"};
+
+const std::vector<std::string> kTypeNames = [] {
+  std::vector<std::string> names;
+  for (int kind = 0; kind < kCouplingKinds; ++kind) names.emplace_back(name_of(static_cast<CouplingKind>(kind)));
+  return names;
+}();
+
+CouplingKind kind_of(const SceneValue& at) {
+  const std::string& type = at.choice(kTypeNames);
+  int kind = 0;
+  while (kTypeNames[static_cast<std::size_t>(kind)] != type) ++kind;
+  return static_cast<CouplingKind>(kind);
+}
+
+SceneValue required(const SceneValue& at, std::string_view key, std::string_view expected) {
+  if (const auto found = at.find(key)) return *found;
+  at.fail(fmt::format("{} has no {}", at.path(), key), expected, "add it");
+}
+
+std::vector<SceneValue> pair_of(const SceneValue& at, std::string_view expected) {
+  std::vector<SceneValue> items = at.list(expected);
+  if (items.size() != 2) at.refuse(expected, "write one for each of both links");
+  return items;
+}
+
+void read_bodies(const SceneValue& at, CouplingSpec& spec) {
+  const std::vector<SceneValue> links = pair_of(required(at, "between", "between: [link, link]; world is one too"), "two links, [link, link]");
+  spec.link_a = links[0].text("the name of a link, or world");
+  spec.link_b = links[1].text("the name of a link, or world");
+  if (spec.kind == CouplingKind::rod) {
+    const std::vector<SceneValue> points = pair_of(required(at, "points", "points: a point of each link, [[x, y, z], [x, y, z]]"), "two points, [[x, y, z], [x, y, z]]");
+    spec.frame_a.translation() = vector_of(points[0].vector("[x, y, z] in m, in the link's frame"));
+    spec.frame_b.translation() = vector_of(points[1].vector("[x, y, z] in m, in the link's frame"));
+    if (const auto length = at.find("length")) spec.length = length->positive();
+    return;
+  }
+  const auto point = at.find("point"), frames = at.find("frames");
+  if (point && frames) frames->fail("point and frames are both given", "one of them", "leave one out");
+  if (!point && !frames) {
+    at.fail(fmt::format("{} says not where", at.path()), "point: [x, y, z] in the world while all coordinates are zero, or frames: of both links", "add one");
+  }
+  if (frames) {
+    const std::vector<SceneValue> both = pair_of(*frames, "two frames, [{position, rotation or quaternion}, {...}]");
+    for (const SceneValue& frame : both) frame.entries_of(kFrameKeys);
+    spec.frame_a = isometry(read_base(both[0]).pose());
+    spec.frame_b = isometry(read_base(both[1]).pose());
+    for (const char* key : {"axis", "second_axis"}) {
+      if (const auto there = at.find(key)) there->fail(fmt::format("{} stands beside frames", key), "frames alone, whose z is the axis", "leave it out");
+    }
+    return;
+  }
+  PointAndAxis where;
+  where.point = vector_of(point->vector("[x, y, z] in m"));
+  const auto axis = at.find("axis"), second = at.find("second_axis");
+  const bool turns = spec.kind != CouplingKind::ball && spec.kind != CouplingKind::weld;
+  if (turns && !axis) at.fail(fmt::format("{} has no axis", at.path()), "axis: [x, y, z], in the world while all coordinates are zero", "add it");
+  if (!turns && axis) axis->fail(fmt::format("a {} has no axis", name_of(spec.kind)), "none", "leave it out");
+  if (axis) where.axis = vector_of(axis->vector("[x, y, z], of any length"));
+  if (second && spec.kind != CouplingKind::universal) second->fail(fmt::format("a {} has no second axis", name_of(spec.kind)), "none", "leave it out");
+  if (second) where.second_axis = vector_of(second->vector("[x, y, z], at right angles to the axis"));
+  spec.at = where;
+}
+
+CouplingSpec read_coupling(const SceneValue& at) {
+  at.entries_of(kAllKeys);
+  CouplingSpec spec;
+  spec.kind = kind_of(required(at, "type", "type: hinge, ball, weld, rod, gear or another one"));
+  at.entries_of(spec.kind == CouplingKind::gear ? kGearKeys : spec.kind == CouplingKind::rod ? kRodKeys : kBodyKeys);
+  if (const auto name = at.find("name")) spec.name = name->text("a name");
+  if (spec.kind != CouplingKind::gear) {
+    read_bodies(at, spec);
+    return spec;
+  }
+  for (const SceneValue::Entry& entry : required(at, "joints", "joints: {joint: ratio, joint: ratio}").entries("joints with their ratios")) {
+    spec.joints.push_back({entry.key, entry.value.number()});
+  }
+  if (const auto offset = at.find("offset")) spec.offset = offset->number();
+  return spec;
+}
+
+}  // namespace
+
+Model read_couplings(const SceneValue& at, Model model) {
+  for (const SceneValue& item : at.list("couplings, {type: hinge, between: [link, link], point: [x, y, z], axis: [x, y, z]}")) {
+    const CouplingSpec spec = read_coupling(item);
+    model = item.located([&] { return coupled(std::move(model), {spec}); });
+  }
+  return model;
+}
+
+}  // namespace linden

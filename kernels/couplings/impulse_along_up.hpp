@@ -1,0 +1,44 @@
+// First half of a solve for an impulse that few joints feel: those, and all joints above them.
+//
+//   u_i = r_i - S_i^T b_i,    b_parent += Ad_{X_i^-1}^T (b_i + gain_i u_i)                                       (impulse_pass_up)
+//
+// With gain_up and the placements of the beginning this is what is left of a column G^T when the joints below have yielded. The second half of
+// a solve, read from the leaves to the root, has the same form: with gain_down and the placements of the end it is what a row J becomes for
+// which  J A^-1 r = y.(d^-1 u),  y the row and u what is left of r. So J A^-1 G^T takes two sweeps over a path and no tree solve.
+//
+// reads   screw 2 x n, placements, gain 6 x nv, given(joint, k): r of joint slots[k]
+// writes  take(joint, k, b, u) for each of them; bias 6 x n, of their rows alone
+// slots   leaves first; each joint's parent is there too, or is the world
+// source  see impulse_pass_up.hpp; Featherstone, Rigid Body Dynamics Algorithms, 8.5 (loops within a tree's solve)
+#pragma once
+
+#include <span>
+
+#include "kernels/tree/impulse_pass_up.hpp"
+
+namespace linden {
+
+template <class S, class Element, class PlacementOf, class Given, class Take>
+void impulse_along_up(const Tree& tree, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Field<S, 6>& gain,
+                      std::span<const Index> slots, const Given& given, const Take& take, Field<S, 6>& bias) {
+  const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
+  for (const Index i : slots) store(bias, i, Wrench<S>{zero, zero});
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    const Index i = slots[k];
+    with_joint(tree.kind(i), [&](auto joint) {
+      const auto b = load<Wrench, S>(bias, i);
+      const Wrench<S> u = given(joint, k) - project(joint, constants, i, b);
+      take(joint, k, b, u);
+      const Index parent = tree.parent(i), row = tree.first_v(i);
+      if (parent == 0) return;
+      Wrench<S> passed = b + u;
+      if constexpr (joint == JointKind::screw) passed = b + u.n.x * load<Wrench, S>(gain, row);
+      if constexpr (joint == JointKind::ball) {
+        passed = b + u.n.x * load<Wrench, S>(gain, row) + u.n.y * load<Wrench, S>(gain, row + 1) + u.n.z * load<Wrench, S>(gain, row + 2);
+      }
+      store(bias, parent, load<Wrench, S>(bias, parent) + to_parent(placement_of(joint, i), passed));
+    });
+  }
+}
+
+}  // namespace linden

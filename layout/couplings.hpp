@@ -1,0 +1,68 @@
+// layout/couplings.hpp
+// Ties between two bodies that the tree does not know of: what closes a loop, holds a body to the world, or makes coordinates turn each other.
+//
+// A coupling has a frame on each of its bodies, and is made of *rows*: one number each, its gap, that is to stay zero. With A and B the two
+// frames in the world, a_x a_y a_z and b_x b_y b_z their axes, d = A^T (x_B - x_A) how far apart they are, seen from A:
+//
+//   ball            d = 0                                                       3
+//   hinge           d = 0, a_x.b_z = a_y.b_z = 0            turns about z       5
+//   universal       d = 0, a_x.b_y = 0          turns about x of A, y of B      4
+//   cylindrical     d_x = d_y = 0, a_x.b_z = a_y.b_z = 0  and shifts along z    4
+//   slider          the same, a_x.b_y = 0                   shifts along z      5
+//   weld            d = 0, a_x.b_z = a_y.b_z = a_x.b_y = 0                      6
+//   point_on_line   d_x = d_y = 0                  x_B on the z axis of A       2
+//   point_on_plane  d_z = 0                        x_B in the xy plane of A     1
+//   rod             |x_B - x_A| = length                                        1
+//   gear            sum of ratio q + offset = 0, of coordinates of screws       1
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "layout/field.hpp"
+#include "layout/pose.hpp"
+
+namespace linden {
+
+enum class CouplingKind : std::uint8_t { ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear };
+inline constexpr int kCouplingKinds = 10;
+
+/// What a row asks for.
+enum class GapKind : std::uint8_t {
+  shift,    // d along axis a of A
+  product,  // cosine of the angle between axis a of A and axis b of B
+  length,   // distance beyond the length
+  sum,      // of coordinates
+};
+
+struct GapRow {
+  GapKind kind;
+  int a = 0, b = 0;  // axes: 0, 1, 2
+};
+
+/// Of a gear.
+struct GearTerm {
+  Index q_row, v_row;
+  double ratio;
+};
+
+struct Coupling {
+  std::string name;
+  CouplingKind kind = CouplingKind::ball;
+  Index slot_a = 0, slot_b = 0;  // 0: the world; of a gear both
+  Pose frame_a{}, frame_b{};     // in the frames of the bodies
+  double length = 0;             // [m], of a rod
+  std::vector<GearTerm> terms{}; // of a gear
+  double offset = 0;             // likewise
+};
+
+/// Name of a kind in scenes and messages.
+const char* name_of(CouplingKind kind);
+/// Rows that a coupling of this kind is made of.
+std::span<const GapRow> rows_of(CouplingKind kind);
+/// Rows of all of them.
+Index row_count(std::span<const Coupling> couplings);
+
+}  // namespace linden

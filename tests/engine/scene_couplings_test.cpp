@@ -1,0 +1,81 @@
+// Couplings as scenes say them: every type, starts that are open, and what is wrong.
+#include <catch2/catch.hpp>
+
+#include <fmt/format.h>
+
+#include "engine/mobility.hpp"
+#include "engine/scene/scene_file.hpp"
+#include "engine/simulation.hpp"
+#include "tests/engine/mechanisms.hpp"
+#include "tests/engine/scenes.hpp"
+
+namespace linden::scene_couplings_test {
+namespace {
+
+constexpr const char* kPin = "{type: hinge, name: pin, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 1, 0]}";
+
+Scene with(const std::string& couplings, const std::string& more = "") {
+  return parse_scene(fmt::format("model: {}\nduration: 1\ncouplings:\n  - {}\neffects: {{gravity: [0, 0, -9.81]}}\n{}\n", model_file("four_bar.urdf"), couplings, more),
+                     "four_bar.yaml");
+}
+
+TEST_CASE("couplings of every type are read, leave what they say, and stay closed") {
+  struct Case {
+    const char* text;
+    Index rows, freedom;  // of a four-bar that is cut open: three joints in a plane
+  };
+  const auto c = GENERATE(Case{kPin, 5, 1}, Case{"{type: ball, between: [coupler, rocker], point: [2, 0, 2]}", 3, 1},
+                          Case{"{type: universal, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 1, 0], second_axis: [1, 0, 0]}", 4, 1},
+                          Case{"{type: cylindrical, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 1, 0]}", 4, 1},
+                          Case{"{type: slider, between: [coupler, world], point: [2, 0, 2], axis: [0, 0, 1]}", 5, 1},
+                          Case{"{type: weld, between: [coupler, rocker], point: [2, 0, 2]}", 6, 0},
+                          Case{"{type: point_on_line, between: [world, coupler], point: [2, 0, 2], axis: [1, 0, 0]}", 2, 2},
+                          Case{"{type: point_on_plane, between: [world, coupler], point: [2, 0, 2], axis: [0, 0, 1]}", 1, 2},
+                          Case{"{type: rod, between: [coupler, rocker], points: [[2, 0, 1], [-0.5, 0, 1]]}", 1, 2},
+                          Case{"{type: gear, joints: {crank: 2, rocker: -1}}", 1, 2});
+  CAPTURE(c.text);
+  const Scene scene = with(c.text);
+  const Mobility mobility = mobility_of(scene.model, scene.initial.positions);
+  CHECK(mobility.rows == c.rows);
+  CHECK(mobility.freedom == c.freedom);
+  Simulation simulation(scene);
+  const double before = simulation.energy().total();
+  REQUIRE(simulation.run(500).ok());
+  CHECK(worst_gap(simulation.couplings()) < 1e-12);
+  CHECK(simulation.energy().total() == Approx(before).margin(1e-3));
+}
+
+TEST_CASE("a start that is open is closed if it is told to be, or nearly closed already") {
+  CHECK_THROWS_WITH(with(kPin, "initial: {positions: {crank: 0.4}}"),
+                    Catch::Contains("coupling \"pin\" is open by") && Catch::Contains("assemble: true"));
+  for (const char* start : {"initial: {positions: {crank: 0.4}}\nassemble: true", "initial: {positions: {crank: 0.0002}}"}) {
+    Simulation simulation(with(kPin, start));
+    CHECK(worst_gap(simulation.couplings()) < 1e-12);
+  }
+  CHECK_THROWS_WITH(with("{type: rod, between: [crank, world], points: [[0, 0, 1], [9, 0, 0]], length: 1}", "assemble: true"),
+                    Catch::Contains("cannot be closed: 7 is the least that it is open by"));
+  CHECK_THROWS_WITH(parse_scene(fmt::format("model: {}\nduration: 1\nassemble: true\n", model_file("four_bar.urdf")), "s.yaml"),
+                    Catch::Contains("nothing to assemble"));
+}
+
+TEST_CASE("what a coupling cannot be is told with its line") {
+  const auto message = [](const std::string& text) -> std::string {
+    try {
+      with(text);
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK_THAT(message("{type: hinge, between: [coupler, rocket], point: [0, 0, 0], axis: [0, 1, 0]}"),
+             Catch::Contains("four_bar.yaml:4") && Catch::Contains("did you mean \"rocker\""));
+  CHECK_THAT(message("{type: hing, between: [coupler, rocker]}"), Catch::Contains("hinge"));
+  CHECK_THAT(message("{type: hinge, between: [coupler, rocker], axis: [0, 1, 0]}"), Catch::Contains("says not where"));
+  CHECK_THAT(message("{type: hinge, between: [coupler, rocker], point: [2, 0, 2]}"), Catch::Contains("has no axis"));
+  CHECK_THAT(message("{type: hinge, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 0, 0]}"), Catch::Contains("no length"));
+  CHECK_THAT(message("{type: ball, between: [coupler, coupler], point: [2, 0, 2]}"), Catch::Contains("both of its links"));
+  CHECK_THAT(message("{type: gear, joints: {crank: 0, rocker: 1}}"), Catch::Contains("other than zero"));
+}
+
+}  // namespace
+}  // namespace linden::scene_couplings_test

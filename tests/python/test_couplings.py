@@ -1,0 +1,51 @@
+"""Mechanisms with loops: couplings of scenes, alone and in a batch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import linden
+from places import MODELS, SCENES
+
+PIN = {"type": "hinge", "name": "pin", "between": ["coupler", "rocker"], "point": [2, 0, 2], "axis": [0, 1, 0]}
+
+
+def test_a_loop_stays_closed_and_keeps_its_energy() -> None:
+    sim = linden.Simulation(linden.load_scene(SCENES / "four_bar.yaml"))
+    energy = sim.energy.total
+    sim.run(2000)
+    (pin,) = sim.couplings
+    assert pin.name == "pin"
+    assert pin.gaps.shape == pin.forces.shape == (5,)
+    assert np.abs(pin.gaps).max() < 1e-13
+    assert list(pin.held_already).count(True) == 3
+    assert np.abs(pin.forces).max() > 1
+    assert sim.energy.total == pytest.approx(energy, abs=1e-3)
+
+
+def test_instances_of_a_batch_move_as_a_simulation_does() -> None:
+    scene = linden.load_scene(SCENES / "four_bar.yaml")
+    batch, sim = linden.Batch(scene, instances=5, observe=["q"]), linden.Simulation(scene)
+    batch.step(300)
+    sim.run(300)
+    np.testing.assert_allclose(batch.q, np.tile(sim.q, (5, 1)), atol=1e-9)
+
+
+def test_an_open_start_is_refused_until_it_is_assembled() -> None:
+    model = linden.load(MODELS / "four_bar.urdf")
+    sim = linden.Simulation(model, couplings=[PIN], effects={"gravity": [0, 0, -9.81]})
+    sim.q = [0.5, 0, 0]
+    with pytest.raises(linden.InputError, match="pin.*is open by"):
+        sim.step()
+    sim.assemble()
+    assert np.abs(sim.couplings[0].gaps).max() < 1e-12
+    sim.step()
+    with pytest.raises(linden.InputError, match="pin.*is open by"):
+        linden.Batch(sim.scene, instances=2).reset(q=[[0.5, 0, 0], [0.5, 0, 0]])
+
+
+def test_what_a_coupling_cannot_be_is_told() -> None:
+    model = linden.load(MODELS / "four_bar.urdf")
+    with pytest.raises(linden.InputError, match="did you mean \"rocker\""):
+        linden.Simulation(model, couplings=[{**PIN, "between": ["coupler", "rocket"]}])
