@@ -203,15 +203,24 @@ TEST_CASE("A batch closes starts that are nearly closed and refuses those that a
   CHECK_THROWS_WITH(batch.reset(2, std::vector{0.3, 0.0, 0.0}, rest), Catch::Contains("coupling \"pin\" is open by"));
 }
 
+namespace {
+
+/// 2 rad/s from zero on, for three seconds.
+JointMotion turned(Index row) {
+  JointMotion motion{row, {{0}, {0}}};
+  for (int k = 1; k <= 60; ++k) {
+    motion.position.times.push_back(0.05 * k);
+    motion.position.values.push_back(0.1 * k);
+  }
+  return motion;
+}
+
+}  // namespace
+
 TEST_CASE("A mechanism that is driven begins at the speed of its drive") {
   const Model model = four_bar(CouplingKind::hinge);
   Effects effects;
-  JointMotion motion{0, {{0}, {0}}};
-  for (int k = 1; k < 100; ++k) {
-    motion.position.times.push_back(0.01 * k);
-    motion.position.values.push_back(0.02 * k);
-  }
-  effects.motions.push_back(motion);
+  effects.motions.push_back(turned(0));
   for (const bool given : {false, true}) {
     Simulation simulation(model, {.step = 1e-3}, effects);
     if (given) simulation.set_velocities(std::vector{5.0, -3.0, 1.0});
@@ -234,12 +243,7 @@ TEST_CASE("A step that would open a coupling is refused by name") {
   // the rocker is led past where the crank can follow
   const Model model = four_bar(CouplingKind::hinge);
   Effects effects;
-  JointMotion motion{1, {{0}, {0}}};
-  for (int k = 1; k < 60; ++k) {
-    motion.position.times.push_back(0.05 * k);
-    motion.position.values.push_back(0.1 * k);
-  }
-  effects.motions.push_back(motion);
+  effects.motions.push_back(turned(1));
   Simulation simulation(model, {.step = 1e-3}, effects);
   StepReport report;
   std::vector<double> before;
