@@ -8,8 +8,10 @@
 
 namespace linden {
 
-Assembly assemble(const Model& model, std::vector<double>& positions, Assembled how) {
-  Simulation simulation(model);
+Assembly assemble(const Model& model, std::vector<double>& positions, Assembled how, const std::vector<JointMotion>& motions) {
+  Effects effects;
+  effects.motions = motions;
+  Simulation simulation(model, Options{}, effects);
   simulation.set_positions(positions);
   Assembly found = simulation.openness();
   if (!found.closed && how == Assembled::from_anywhere) found = simulation.assemble();

@@ -6,6 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "layout/effects.hpp"
+#include "layout/model.hpp"
+
 namespace linden {
 
 /// Of the coupling that is farthest open.
@@ -19,12 +22,11 @@ struct Assembly {
 /// A start that is farther open than this share of its mechanism's size is not closed by itself.
 inline constexpr double kOpenStart = 1e-3;
 
-struct Model;
-
 enum class Assembled : std::uint8_t { if_nearly_closed, from_anywhere };
 
 /// Moves positions [nq] to where the couplings of the model are closed, as near as the mass matrix measures, or least open.
-Assembly assemble(const Model& model, std::vector<double>& positions, Assembled how);
+/// Joints whose motion is given stay where it begins.
+Assembly assemble(const Model& model, std::vector<double>& positions, Assembled how, const std::vector<JointMotion>& motions = {});
 
 /// Throws InputError where a coupling is open, as a start of steps must not be.
 void require_closed(const Assembly& start);

@@ -88,7 +88,7 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
   std::vector<double> neutral = model->neutral();
   if (!model->couplings.empty()) {
     plan.put_positions(0, neutral);
-    neutral_start = assemble(*model, neutral, Assembled::if_nearly_closed);
+    neutral_start = assemble(*model, neutral, Assembled::if_nearly_closed, plan.effects.motions);
     if (!neutral_start.closed) has_start.assign(records.size(), 0);
   }
   for_blocks([&](std::int64_t b, Worker&) {

@@ -34,9 +34,10 @@ std::vector<Bounded> bounded(const Model& model, std::span<const JointLimit> lim
   return result;
 }
 
-void close_couplings(const Model& model, std::uint64_t seed, double spread, std::vector<double>& positions) {
+void close_couplings(const Model& model, std::uint64_t seed, double spread, std::vector<double>& positions,
+                     const std::vector<JointMotion>& motions = {}) {
   if (model.couplings.empty()) return;
-  const Assembly found = assemble(model, positions, Assembled::from_anywhere);
+  const Assembly found = assemble(model, positions, Assembled::from_anywhere, motions);
   if (found.closed) return;
   throw InputError(fmt::format("coupling {} cannot be closed from the random positions of seed {} and spread {:g}: {:.3g} is the least that it is open by; choose "
                                "another seed, or a smaller spread",
@@ -85,8 +86,7 @@ InitialState random_state(const Model& model, std::uint64_t seed, double spread,
   return state;
 }
 
-InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread,
-                           std::span<const JointLimit> limits) {
+InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread, const Effects& effects) {
   const InitialState random = draw_state(model, seed, spread);
   InitialState state = start;
   if (state.positions.empty()) state.positions = model.neutral();
@@ -102,12 +102,12 @@ InitialState random_around(const Model& model, const InitialState& start, std::u
     }
   }
   const std::vector<double> begin = start.positions.empty() ? model.neutral() : start.positions;
-  for (const Bounded& joint : bounded(model, limits)) {
+  for (const Bounded& joint : bounded(model, effects.limits)) {
     double& q = state.positions[joint.q_row];
     q = std::clamp(q, std::min(begin[joint.q_row], joint.limit->lower), std::max(begin[joint.q_row], joint.limit->upper));
   }
   for (std::size_t k = 0; k < state.velocities.size(); ++k) state.velocities[k] += random.velocities[k];
-  close_couplings(model, seed, spread, state.positions);
+  close_couplings(model, seed, spread, state.positions, effects.motions);
   return state;
 }
 

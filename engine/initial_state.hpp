@@ -35,8 +35,7 @@ inline constexpr double kDefaultSpread = 0.1;
 InitialState random_state(const Model& model, std::uint64_t seed, double spread, std::span<const JointLimit> limits = {});
 
 /// A given start with those numbers on top: positions of screws, within their limits and no farther outside than the start is, and all
-/// velocities; orientations and places of ball and free joints stay.
-InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread,
-                           std::span<const JointLimit> limits = {});
+/// velocities; orientations and places of ball and free joints stay. Where there are couplings, joints whose motion is given are where it begins.
+InitialState random_around(const Model& model, const InitialState& start, std::uint64_t seed, double spread, const Effects& effects = {});
 
 }  // namespace linden

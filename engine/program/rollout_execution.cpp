@@ -191,7 +191,7 @@ template <class Real>
 InitialState RolloutExecution<Real>::start_of(std::int64_t i) const {
   const double spread = randomness(arguments_)->spread;
   if (!arguments_.scene) return random_state(*model_, seed_of(i), spread);
-  return random_around(*model_, arguments_.scene->initial, seed_of(i), spread, effects_.limits);
+  return random_around(*model_, arguments_.scene->initial, seed_of(i), spread, effects_);
 }
 
 template <class Real>

@@ -201,7 +201,7 @@ void bind_time(nb::class_<PyBatch<Real>>& c) {
               start.positions.assign(q.data() + k * nq, q.data() + (k + 1) * nq);
               start.velocities.assign(v.data() + k * nv, v.data() + (k + 1) * nv);
               const InitialState drawn =
-                  random_around(scene.model, start, seed + static_cast<std::uint64_t>(which.data()[k]), spread, scene.effects.limits);
+                  random_around(scene.model, start, seed + static_cast<std::uint64_t>(which.data()[k]), spread, scene.effects);
               std::ranges::copy(drawn.positions, q.data() + k * nq);
               std::ranges::copy(drawn.velocities, v.data() + k * nv);
             }

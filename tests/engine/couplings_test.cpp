@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/batch.hpp"
+#include "engine/initial_state.hpp"
 #include "tests/engine/mechanisms.hpp"
 
 namespace linden::couplings_test {
@@ -237,6 +238,23 @@ TEST_CASE("A mechanism that is driven begins at the speed of its drive") {
     REQUIRE(simulation.run(1).ok());
     for (std::size_t row = 0; row < 3; ++row) CHECK(simulation.velocities()[row] == Approx(start[row]).epsilon(0.02));
   }
+}
+
+TEST_CASE("Random starts of a driven mechanism are closed around its drive") {
+  const Model model = four_bar(CouplingKind::hinge);
+  Effects effects;
+  effects.motions.push_back({0, {{0, 1}, {0.2, 1.2}}});
+  std::vector<double> start{0.2, 0, 0};
+  CHECK(assemble(model, start, Assembled::from_anywhere, effects.motions).closed);
+  CHECK(start[0] == 0.2);
+  Batch batch(model, 5, {.step = 1e-3}, effects);
+  for (std::int64_t i = 0; i < 5; ++i) {
+    const InitialState around = random_around(model, {start, {}}, static_cast<std::uint64_t>(i), 0.2, effects);
+    CHECK(around.positions[0] == 0.2);
+    batch.reset(i, around.positions, around.velocities);
+  }
+  batch.step(100);
+  CHECK(batch.summary().frozen == 0);
 }
 
 TEST_CASE("A step that would open a coupling is refused by name") {

@@ -145,7 +145,9 @@ TEST_CASE("a simulation of a scene refuses a start that is none unless it takes 
 TEST_CASE("random starts keep the limits of a scene and leave draws within them as they are", "[start]") {
   const Model model = arm();
   // of the first two joints, narrower than the file's
-  const std::vector<JointLimit> limits{{0, -0.2, 0.2}, {1, 0.1, 0.3}};
+  Effects effects;
+  effects.limits = {{0, -0.2, 0.2}, {1, 0.1, 0.3}};
+  const std::vector<JointLimit>& limits = effects.limits;
   int inside = 0, outside = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     const InitialState free = random_state(model, seed, 0.5), held = random_state(model, seed, 0.5, limits);
@@ -156,7 +158,7 @@ TEST_CASE("random starts keep the limits of a scene and leave draws within them 
       (held.positions[row] == free.positions[row] ? inside : outside) += 1;
     }
     const InitialState start{{0.1, 0.2, -0.1}, {0, 0, 0}};
-    const InitialState around = random_around(model, start, seed, 0.5, limits);
+    const InitialState around = random_around(model, start, seed, 0.5, effects);
     for (std::size_t row = 0; row < 2; ++row) CHECK((around.positions[row] >= limits[row].lower && around.positions[row] <= limits[row].upper));
   }
   CHECK(inside > 10);

@@ -20,10 +20,9 @@ constexpr std::uint64_t kHere = 0;  // company of this number is the scene itsel
 
 /// A start like the scene's.
 InitialState company(const EverydayScene& scene, std::uint64_t number) {
-  const bool driven_loops = scene.coupled && !scene.effects.motions.empty();  // open wherever the motion is not where it was drawn
-  if (number == kHere || driven_loops) return scene.start;
+  if (number == kHere) return scene.start;
   try {
-    return random_around(*scene.model, scene.start, scene.number * 64 + number, 0.2);
+    return random_around(*scene.model, scene.start, scene.number * 64 + number, 0.2, scene.effects);
   } catch (const InputError&) {
     return scene.start;  // a mechanism that cannot be closed near there
   }
