@@ -20,7 +20,7 @@ constexpr int kLate = 10, kMostUpdates = 200;
 }  // namespace
 
 Blows::Blows(TreeSweeps<true>& sweeps, Index velocities) : sweeps_(sweeps), bounds_(sweeps.effects().limits().entries.size()) {
-  for (Field<double>* field : {&velocity_, &change_, &impulse_, &response_}) field->allocate(velocities);
+  for (Field<double>* field : {&velocity_, &change_, &impulse_}) field->allocate(velocities);
 }
 
 bool Blows::at_upper(const State<double>& state, const JointLimit& limit) const {
@@ -113,7 +113,7 @@ void Blows::solve() {
   }
 }
 
-/// Where the joints that are held change by what is asked of them and no other feels an impulse: all changes of velocity, and the impulses.
+/// change_ and impulse_ where the limits that hold are those that bounds_ says.
 void Blows::respond() {
   auto& effects = sweeps_.effects();
   effects.begin_blow();
@@ -124,12 +124,7 @@ void Blows::respond() {
     effects.hold_in_blow(row);
     change_(row) = bounds_[k].velocity() - velocity_(row);
   }
-  spread_mimics<double>(sweeps_.mimics(), change_);
-  sweeps_.momentum_of(change_, impulse_);
-  for (double& impulse : impulse_.flat()) impulse = -impulse;
-  sweeps_.response_to(impulse_, response_);
-  for (Index row = 0; row < change_.rows(); ++row) change_(row) += response_(row);
-  sweeps_.momentum_of(change_, impulse_);
+  sweeps_.blow(change_, impulse_);
 }
 
 /// Limits that would have to pull let go, and what passes a bound is held there; one_by_one: the last of them alone, which never goes round in

@@ -72,7 +72,7 @@ class Blows {
 
   TreeSweeps<true>& sweeps_;
   std::vector<Bound> bounds_;  // of each limit
-  Field<double> velocity_, change_, impulse_, response_;
+  Field<double> velocity_, change_, impulse_;
 };
 
 /// Where a scene has no effects.

@@ -204,6 +204,10 @@ class CouplingSweeps {
   void subtract_push(Field<S>& residual) const {
     push(increment_, residual, [](const S& now, const S& pushed) { return now - pushed; });
   }
+  /// p + G^T kappa, of the solve for velocities made last: what acts beside couplings, where p is what they have left of it.
+  void add_pull(Field<S>& p) const {
+    push(pull_, p, [](const S& now, const S& pushed) { return now + pushed; });
+  }
   /// Of a step: before the evaluation that follows a solve, whatever becomes of the correction, in these lanes.
   void take_multipliers(const Mask& lanes, Field<S>& target) {
     if (empty()) return;

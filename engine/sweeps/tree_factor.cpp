@@ -137,10 +137,19 @@ void TreeSweeps<kEffects>::velocity_of(const Field<double>& p, Field<double>& v)
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::response_to(const Field<double>& impulse, Field<double>& v) {
+void TreeSweeps<kEffects>::blow(Field<double>& change, Field<double>& impulse) {
   if constexpr (kEffects) {
+    spread_mimics<double>(ties_.mimics(), change);
+    momentum_of(change, impulse);
+    for (double& value : impulse.flat()) value = -value;
     effects_.with_reading([&](const auto& added) { factor_mass(added); });
-    apply_mass_inverse(impulse, v);
+    apply_mass_inverse(impulse, work_.increment, &change);
+    for (Index row = 0; row < change.rows(); ++row) change(row) += work_.increment(row);
+    momentum_of(change, impulse);
+    if (!couplings_.empty()) {
+      couplings_.add_pull(impulse);
+      fold_mimics(ties_.mimics(), impulse);
+    }
   }
 }
 

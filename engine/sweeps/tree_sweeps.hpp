@@ -137,8 +137,9 @@ class TreeSweeps {
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
   void velocity_of(const Field<double>& p, Field<double>& v);
   void apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given = nullptr);
-  /// What an impulse makes of velocities at a blow, as velocity_of.
-  void response_to(const Field<double>& impulse, Field<double>& v);
+  /// A blow in which joints that are held (EffectSweeps::hold_in_blow) change by what is asked of them, in `change`, and no other feels an
+  /// impulse but what ties and couplings make of it: all changes, and the impulses that do it.
+  void blow(Field<double>& change, Field<double>& impulse);
   void momentum_of(const Field<double>& v, Field<double>& p);
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
