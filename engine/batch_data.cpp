@@ -54,7 +54,7 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
       hold_factors(computed.hold_factors),
       plan(*model, options, effects),
       arena(threads) {
-  check_order(options.order, effects);
+  check_order(options.order, *model, effects);
   require_threads(threads);
   first_child.assign(static_cast<std::size_t>(shape().slots) + 1, 0);
   for (Index slot = 1; slot < shape().slots; ++slot) ++first_child[static_cast<std::size_t>(model->tree.parent(slot)) + 1];

@@ -19,7 +19,7 @@ Mobility mobility_of(const Model& model, std::span<const double> positions) {
     found.rows += static_cast<Index>(state.gaps.size());
     found.held_already += static_cast<Index>(std::ranges::count(state.redundant, true));
   }
-  found.freedom -= found.rows - found.held_already;
+  found.freedom -= rigid_row_count(model.couplings) - found.held_already;
   return found;
 }
 

@@ -22,8 +22,8 @@ namespace linden {
 
 namespace {
 
-const Options& checked(const Options& options, const Effects& effects) {
-  check_order(options.order, effects);
+const Options& checked(const Options& options, const Model& model, const Effects& effects) {
+  check_order(options.order, model, effects);
   return options;
 }
 
@@ -33,7 +33,7 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(required(std::move(model))), options_(checked(options, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
+    : model_(required(std::move(model))), options_(checked(options, *model_, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
       stepper_(make_stepper(*model_, options, *plan_)) {
   if (model_->tree.most_threads() > 1) require_threads(threads_here());
   state_.allocate(model_->tree.shape);
@@ -49,6 +49,7 @@ Simulation::Simulation(std::shared_ptr<const Model> model, const Options& option
   changed();
   if (!plan_->curves.empty()) set_positions(model_->neutral());
   close_nearly_closed();
+  if (!model_->couplings.empty()) set_velocities(std::vector(rate_.flat().size(), 0.0));
 }
 
 Simulation::Simulation(const Scene& scene)

@@ -1,5 +1,6 @@
 #include "layout/couplings.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace linden {
@@ -41,6 +42,29 @@ std::span<const GapRow> rows_of(CouplingKind kind) {
     case CouplingKind::gear: return kGear;
   }
   return {};
+}
+
+const Compliance& compliance_of(const Coupling& coupling, const GapRow& row) {
+  return row.kind == GapKind::shift || row.kind == GapKind::length ? coupling.shift : coupling.turn;
+}
+
+bool gives_way(const Coupling& coupling) {
+  return std::ranges::any_of(rows_of(coupling.kind), [&](const GapRow& row) { return compliance_of(coupling, row).gives_way(); });
+}
+
+std::string kind_text(const Coupling& coupling) {
+  if (!gives_way(coupling)) return name_of(coupling.kind);
+  if (coupling.kind == CouplingKind::rod) return "spring";
+  if (coupling.kind == CouplingKind::weld) return "bushing";
+  return std::string("soft ") + name_of(coupling.kind);
+}
+
+Index rigid_row_count(std::span<const Coupling> couplings) {
+  std::ptrdiff_t rows = 0;
+  for (const Coupling& coupling : couplings) {
+    rows += std::ranges::count_if(rows_of(coupling.kind), [&](const GapRow& row) { return !compliance_of(coupling, row).gives_way(); });
+  }
+  return static_cast<Index>(rows);
 }
 
 Index row_count(std::span<const Coupling> couplings) {

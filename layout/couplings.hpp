@@ -14,6 +14,9 @@
 //   point_on_plane  d_z = 0                        x_B in the xy plane of A     1
 //   rod             |x_B - x_A| = length                                        1
 //   gear            sum of ratio q + offset = 0, of coordinates of screws       1
+//
+// Rows may give way: springs and dampers along their gaps instead of multipliers (kernels/couplings/compliance.hpp). A rod that does is a
+// spring between two points, a weld a bushing.
 #pragma once
 
 #include <cstdint>
@@ -48,6 +51,12 @@ struct GearTerm {
   double ratio;
 };
 
+/// Of a row that gives way: force = -stiffness gap - damping d gap / dt. Both zero: it does not.
+struct Compliance {
+  double stiffness = 0, damping = 0;
+  bool gives_way() const { return stiffness != 0 || damping != 0; }
+};
+
 struct Coupling {
   std::string name;
   CouplingKind kind = CouplingKind::ball;
@@ -56,13 +65,21 @@ struct Coupling {
   double length = 0;             // [m], of a rod
   std::vector<GearTerm> terms{}; // of a gear
   double offset = 0;             // likewise
+  Compliance shift{}, turn{};    // of rows in m [N/m, N s/m]; of those that are products, near zero an angle, and of gears [N m, N m s]
 };
 
 /// Name of a kind in scenes and messages.
 const char* name_of(CouplingKind kind);
 /// Rows that a coupling of this kind is made of.
 std::span<const GapRow> rows_of(CouplingKind kind);
-/// Rows of all of them.
+/// Of a row of this coupling.
+const Compliance& compliance_of(const Coupling& coupling, const GapRow& row);
+/// Whether some row of it does.
+bool gives_way(const Coupling& coupling);
+/// What it is: the name of its kind, of a rod that gives way a spring, of a weld that does a bushing, of others "soft hinge".
+std::string kind_text(const Coupling& coupling);
+/// Rows of all of them; of these, those that do not give way.
 Index row_count(std::span<const Coupling> couplings);
+Index rigid_row_count(std::span<const Coupling> couplings);
 
 }  // namespace linden

@@ -47,6 +47,11 @@ std::uint64_t Model::hash() const {
     }
     hash.add_number(coupling.length);
     hash.add_number(coupling.offset);
+    for (const Compliance* law : {&coupling.shift, &coupling.turn}) {
+      if (!law->gives_way()) continue;
+      hash.add_number(law->stiffness);
+      hash.add_number(law->damping);
+    }
     for (const GearTerm& term : coupling.terms) {
       hash.add_number(term.v_row);
       hash.add_number(term.ratio);

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "layout/effects.hpp"
+#include "layout/model.hpp"
 #include "layout/support/input_error.hpp"
+#include "layout/support/words.hpp"
 
 namespace linden {
 namespace {
@@ -59,8 +61,14 @@ std::string sudden(const Effects& effects) {
   return fmt::format("{}", fmt::join(found, ", "));
 }
 
-void check_order(int order, const Effects& effects) {
-  const std::string refused = order == 2 ? "" : irreversible(effects);
+void check_order(int order, const Model& model, const Effects& effects) {
+  if (order == 2) return;
+  std::string refused = irreversible(effects);
+  for (const Coupling& coupling : model.couplings) {
+    if (coupling.shift.damping == 0 && coupling.turn.damping == 0) continue;
+    refused += fmt::format("{}the damping of coupling {}", refused.empty() ? "" : ", ", quoted(coupling.name));
+    break;
+  }
   if (refused.empty()) return;
   throw InputError(
       fmt::format("a step of order {} goes back in time between whiles, where effects that take energy would return it and "

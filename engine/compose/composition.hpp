@@ -37,6 +37,7 @@
 namespace linden {
 
 struct Effects;
+struct Model;
 
 /// gamma_1, ..., gamma_s. Throws InputError for an order that is none of 2, 4, 6, 8.
 std::span<const double> composition(int order);
@@ -48,7 +49,7 @@ std::string irreversible(const Effects& effects);
 /// limited force, given motions, ground.
 std::string sudden(const Effects& effects);
 
-/// Throws InputError where the order is above 2 and an effect cannot be taken back in time.
-void check_order(int order, const Effects& effects);
+/// Throws InputError where the order is above 2 and an effect, or what damps a coupling, cannot be taken back in time.
+void check_order(int order, const Model& model, const Effects& effects);
 
 }  // namespace linden

@@ -72,7 +72,7 @@ double Blows::strike(State<double>& state, bool arrived, int& blows) {
   }
   if (blows > before) {
     // what held a joint until the blow set it in motion is not in p
-    sweeps_.momentum_of(velocity_, impulse_);
+    sweeps_.momentum_read_as(velocity_, impulse_);
     effects.read_as(impulse_, state.p);
   }
   return taken;

@@ -1,5 +1,5 @@
 // engine/effects/effect_work.hpp
-// The account of a scene's effects: of each of them as its facts say, layout/effects/facts.hpp.
+// The account of a scene's effects: of each of them as its facts say, layout/effects/facts.hpp; and of couplings that give way.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +13,7 @@ namespace linden {
 /// What effects gave (driving ones) or took (losses) [J].
 struct EffectWork {
   std::array<double, kEffectLists> each{};  // list by list; zero of what neither gives nor takes
+  double couplings = 0;                     // taken by couplings that give way
 
   /// Of the effect with entries of this kind: work.of<JointFriction>().
   template <class Entry>
@@ -26,16 +27,17 @@ struct EffectWork {
 
   void add(const EffectWork& more) {
     for (std::size_t k = 0; k < each.size(); ++k) each[k] += more.each[k];
+    couplings += more.couplings;
   }
   double magnitude() const {
-    double sum = 0;
+    double sum = std::abs(couplings);
     for (const double work : each) sum += std::abs(work);
     return sum;
   }
   /// What drives, and on the whole took energy, is among what takes.
   double given() const { return driven(1); }
   double taken() const {
-    double sum = 0;
+    double sum = couplings;
     for (std::size_t k = 0; k < each.size(); ++k) sum += kEffectFacts[k]->account == Account::taken ? each[k] : 0;
     return sum + driven(-1);
   }

@@ -54,7 +54,7 @@ void say_couplings(const Model& model, const Mobility& mobility, std::size_t cou
                {"gap", Align::right}});
   for (std::size_t k = 0; k < count; ++k) {
     const CouplingState& state = mobility.couplings[k];
-    table.add({printable(state.name), name_of(model.couplings[k].kind), between(model, model.couplings[k]), fmt::format("{}", state.gaps.size()),
+    table.add({printable(state.name), kind_text(model.couplings[k]), between(model, model.couplings[k]), fmt::format("{}", state.gaps.size()),
                held_already(state), fmt::format("{:.1e}", largest_gap(state))});
   }
   say_text(table.text("  "));
@@ -80,6 +80,7 @@ nlohmann::ordered_json couplings_json(const Model& model, const Mobility& mobili
     couplings.push_back({{"name", state.name},
                          {"kind", name_of(model.couplings[k].kind)},
                          {"between", between(model, model.couplings[k])},
+                         {"gives_way", gives_way(model.couplings[k])},
                          {"gaps", state.gaps},
                          {"held_already", state.redundant}});
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string_view>
@@ -13,7 +14,8 @@ std::vector<EnergyShare> energy_by_effect(Simulation& simulation) {
   const Energy energy = simulation.energy();
   std::vector<EnergyShare> shares{{"kinetic", energy.kinetic}};
   if (simulation.options().gravity != std::array<double, 3>{0, 0, 0}) shares.push_back({"gravity", energy.gravity()});
-  bool springs = false;
+  const std::vector<Coupling>& couplings = simulation.model().couplings;
+  bool springs = std::ranges::any_of(couplings, gives_way);
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
     springs = springs || (Entry::facts.stores && Entry::facts.site == Site::joint && !entries.empty());
   });
@@ -24,6 +26,7 @@ std::vector<EnergyShare> energy_by_effect(Simulation& simulation) {
     const std::string_view sense = Entry::facts.account == Account::taken ? "taken" : "given";
     shares.push_back({fmt::format("{}_{}", Entry::facts.name, sense), simulation.effect_work().of<Entry>()});
   });
+  if (std::ranges::any_of(couplings, gives_way)) shares.push_back({"couplings_taken", simulation.effect_work().couplings});
   return shares;
 }
 

@@ -11,20 +11,28 @@
 namespace linden {
 namespace {
 
-const std::vector<std::string> kBodyKeys{"type", "name", "between", "point", "axis", "second_axis", "frames"};
-const std::vector<std::string> kRodKeys{"type", "name", "between", "points", "length"};
-const std::vector<std::string> kGearKeys{"type", "name", "joints", "offset"};
-const std::vector<std::string> kAllKeys{"type", "name", "between", "point", "axis", "second_axis", "frames", "points", "length", "joints", "offset"};
+using Keys = std::vector<std::string>;
+const Keys kBodyKeys{"type",   "name",      "between", "point",             "axis",           "second_axis",
+                     "frames", "stiffness", "damping", "turning_stiffness", "turning_damping"};
+const Keys kRodKeys{"type", "name", "between", "points", "length"};
+const Keys kSpringKeys{"type", "name", "between", "points", "stiffness", "damping", "rest"};
+const Keys kGearKeys{"type", "name", "joints", "offset", "turning_stiffness", "turning_damping"};
+const Keys kAllKeys{"type",   "name",   "between", "point",     "axis",    "second_axis", "frames",            "points",
+                    "length", "joints", "offset",  "stiffness", "damping", "rest",        "turning_stiffness", "turning_damping"};
+/// A rod that gives way, by the name that people know.
+constexpr const char* kSpring = "spring";
 const std::vector<std::string> kFrameKeys{"position", "rotation", "quaternion"};
 
 const std::vector<std::string> kTypeNames = [] {
   std::vector<std::string> names;
   for (int kind = 0; kind < kCouplingKinds; ++kind) names.emplace_back(name_of(static_cast<CouplingKind>(kind)));
+  names.emplace_back(kSpring);
   return names;
 }();
 
 CouplingKind kind_of(const SceneValue& at) {
   const std::string& type = at.choice(kTypeNames);
+  if (type == kSpring) return CouplingKind::rod;
   int kind = 0;
   while (kTypeNames[static_cast<std::size_t>(kind)] != type) ++kind;
   return static_cast<CouplingKind>(kind);
@@ -50,6 +58,10 @@ void read_bodies(const SceneValue& at, CouplingSpec& spec) {
     spec.frame_a.translation() = vector_of(points[0].vector("[x, y, z] in m, in the link's frame"));
     spec.frame_b.translation() = vector_of(points[1].vector("[x, y, z] in m, in the link's frame"));
     if (const auto length = at.find("length")) spec.length = length->positive();
+    if (const auto rest = at.find("rest")) {
+      spec.length = rest->not_negative("a length in m");
+      if (spec.length == 0) spec.kind = CouplingKind::ball;  // which has a direction where both points meet
+    }
     return;
   }
   const auto point = at.find("point"), frames = at.find("frames");
@@ -79,11 +91,25 @@ void read_bodies(const SceneValue& at, CouplingSpec& spec) {
   spec.at = where;
 }
 
+Compliance read_compliance(const SceneValue& at, std::string_view stiffness, std::string_view damping) {
+  Compliance read;
+  if (const auto value = at.find(stiffness)) read.stiffness = value->not_negative("a stiffness, zero or more");
+  if (const auto value = at.find(damping)) read.damping = value->not_negative("a damping, zero or more");
+  return read;
+}
+
 CouplingSpec read_coupling(const SceneValue& at) {
   at.entries_of(kAllKeys);
   CouplingSpec spec;
-  spec.kind = kind_of(required(at, "type", "type: hinge, ball, weld, rod, gear or another one"));
-  at.entries_of(spec.kind == CouplingKind::gear ? kGearKeys : spec.kind == CouplingKind::rod ? kRodKeys : kBodyKeys);
+  const SceneValue type = required(at, "type", "type: hinge, ball, weld, rod, spring, gear or another one");
+  spec.kind = kind_of(type);
+  const bool spring = type.choice(kTypeNames) == kSpring;
+  at.entries_of(spec.kind == CouplingKind::gear ? kGearKeys : spring ? kSpringKeys : spec.kind == CouplingKind::rod ? kRodKeys : kBodyKeys);
+  spec.shift = read_compliance(at, "stiffness", "damping");
+  spec.turn = read_compliance(at, "turning_stiffness", "turning_damping");
+  if (spring && !spec.shift.gives_way()) {
+    at.fail(fmt::format("{} neither pulls nor damps", at.path()), "stiffness: in N/m, damping: in N s/m, or both; a rod is rigid", "add one");
+  }
   if (const auto name = at.find("name")) spec.name = name->text("a name");
   if (spec.kind != CouplingKind::gear) {
     read_bodies(at, spec);

@@ -309,7 +309,7 @@ bool TreeStepper<kEffects>::gains_energy(const State<double>& state, int history
 
 template <bool kEffects>
 Evaluated<double> TreeStepper<kEffects>::first_evaluation(State<double>& state, int history, double h, Factor factor, StepReport& report) {
-  sweeps_.start(state.q);
+  sweeps_.start(state.q, h);
   if (unfinished_) {
     const double h_before = *unfinished_;
     unfinished_.reset();
@@ -321,6 +321,7 @@ Evaluated<double> TreeStepper<kEffects>::first_evaluation(State<double>& state, 
     return sweeps_.evaluate_from(state, extrapolation(state.history, history), h, factor, report);
   }
   momentum_target_map(model_.tree, h, state.p, work_.force, work_.momentum_target);
+  sweeps_.change_step(h, work_.momentum_target);
   first_guess(options_.guess, model_, state, history, h, sweeps_);
   if constexpr (kEffects) begin_effects(state, h);
   spread_mimics<double>(sweeps_.mimics(), work_.delta);  // corrections keep ties, so the guess must
@@ -352,6 +353,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
     }
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
+  part.work.couplings = sweeps_.end_couplings(h);
   history = std::min(history + 1, kHistory);
   const bool known = !has_stages_ && state.last_step(0) != 0;
   state.last_step(0) = h;
@@ -363,10 +365,11 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   if constexpr (kEffects) {
     part.work.of<Ground>() -= effects_.ground_stored();
     part.kinetic = solve_.mean_kinetic();
-    account_.add(part);
     time_ += h;
     for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.end_impulse(row);
   }
+  account_.add(part);
+  sweeps_.add_coupling_ends(h, state.p);
   fold_mimics(sweeps_.mimics(), state.p);
   if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
   if constexpr (kEffects) {
@@ -405,7 +408,7 @@ Energy TreeStepper<kEffects>::energy_of(const State<double>& state, Field<double
     const double ground = effects_.ground_potential();
     return {kinetic, sweeps_.potential(), sweeps_.effect_potential() - ground, ground};
   }
-  return {kinetic, sweeps_.potential()};
+  return {kinetic, sweeps_.potential(), sweeps_.effect_potential()};
 }
 
 template <bool kEffects>

@@ -55,7 +55,7 @@ class TreeStepper final : public Stepper {
   void read_velocity(const State<double>& state, Field<double>& v) override;
   void momentum_of(Field<double>& v, Field<double>& p) override {
     sweeps_.close_velocities(v);
-    sweeps_.momentum_of(v, p);
+    sweeps_.momentum_read_as(v, p);
   }
   Wrench<double> total_momentum(const State<double>& state, Field<double>& rate) override;
   Energy energy_of(const State<double>& state, Field<double>& rate) override;

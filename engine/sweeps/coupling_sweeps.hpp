@@ -13,6 +13,7 @@
 //                     (masked_solve.hpp)
 //   give_way          after the first half of the tree's solve, with u left of r: S dlambda = J A^-1 r - g, and u of r - G^T dlambda
 //   take_multipliers  the target of the residual gets G^T dlambda, before the next evaluation
+//   end               what rows that give way push at the end of the step (kernels/couplings/compliance.hpp)
 //
 // Multipliers are carried times h, like all impulses of a step, and begin at zero: the residual is linear in them, so what they begin with
 // changes no correction, and a correction that is cut short needs none of them back. What has not been taken yet is found anew, to the bit, by
@@ -29,10 +30,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "engine/sweeps/coupling_paths.hpp"
 #include "kernels/block/evaluate_down.hpp"
+#include "kernels/couplings/compliance.hpp"
 #include "kernels/couplings/gap_map.hpp"
 #include "kernels/couplings/impulse_along_up.hpp"
 #include "kernels/couplings/masked_solve.hpp"
@@ -41,9 +45,9 @@
 
 namespace linden {
 
-/// What is solved for: the displacement of a step, with J and gaps at its end; velocities at q^k, with G and no gaps; positions that close the
-/// gaps there.
-enum class Coupled : std::uint8_t { step, velocities, positions };
+/// What is solved for: the displacement of a step, with J and gaps at its end; velocities at q^k, with G and no gaps, and those that momenta
+/// are read as, where dampers of rows that give way have their say; positions that close the gaps there.
+enum class Coupled : std::uint8_t { step, velocities, reading, positions };
 
 template <class S>
 class CouplingSweeps {
@@ -58,13 +62,16 @@ class CouplingSweeps {
     left_.allocate(shape.velocities, S(0.0));
     const std::size_t rows = paths_.rows();
     solve_ = fresh_ = MaskedSolve<S>(rows);
-    for (std::vector<S>* each : {&gap_, &size_, &scale_, &lambda_, &increment_, &pull_}) each->assign(rows, S(0.0));
+    for (std::vector<S>* each : {&gap_, &size_, &scale_, &lambda_, &increment_, &pull_, &moved_by_itself_}) each->assign(rows, S(0.0));
     for (std::vector<S>* each : {&begin_, &end_, &across_, &moved_}) each->assign(paths_.numbers(), S(0.0));
     for (const CouplingPath& path : paths_.all()) {
       for (const auto& term : path.coupling->terms) at_start_.push_back(as<S>(term.ratio));
       for (std::size_t row = 0; row < path.rows(); ++row) {
         const GapKind kind = rows_of(path.coupling->kind)[row].kind;
         size_[path.first_row + row] = as<S>(kind == GapKind::product || kind == GapKind::sum ? 1.0 : path.length);
+        const Compliance& compliance = compliance_of(*path.coupling, rows_of(path.coupling->kind)[row]);
+        rigid_.push_back(!compliance.gives_way());
+        if (compliance.gives_way()) springs_.push_back({path.first_row + row, compliance});
       }
       for (const CouplingPath::Joint& joint : path.reach) slots_.push_back(joint.slot);
     }
@@ -73,9 +80,13 @@ class CouplingSweeps {
     felt_.resize(coordinates);
     for (Field<S>& row : felt_) row.allocate(shape.velocities, S(0.0));
     pulls_.assign(coordinates, S(0.0));
+    if (gives_way()) ends_.allocate(shape.velocities, S(0.0));
   }
 
   bool empty() const { return paths_.empty(); }
+  /// Whether some row does.
+  bool gives_way() const { return !springs_.empty(); }
+  bool is_rigid(std::size_t row) const { return rigid_[row]; }
 
   /// Bodies at q^k, where the tree's placements are; gears by their coordinates.
   void place(const Field<S, 12>& placement, const Field<S>& q) {
@@ -89,14 +100,16 @@ class CouplingSweeps {
       for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
     }
     look([&](Index slot) { return load<Placement, S>(pose_, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
+    for (Spring& spring : springs_) spring.begin = gap_[spring.row];
   }
   /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
   void keep_scales(bool keep) { keeps_scales_ = keep; }
 
-  /// Before the first evaluation of a step.
-  void begin() {
+  /// Before the first evaluation of a step of h.
+  void begin(double h) {
     std::ranges::fill(lambda_, S(0.0));
     std::ranges::fill(increment_, S(0.0));
+    find_laws(h);
   }
 
   /// Gaps at the end of a displacement, and how joints change them there.
@@ -151,7 +164,14 @@ class CouplingSweeps {
       }
     }
     multiply(ties.coordinates());
-    for (std::size_t j = 0; j < gap_.size(); ++j) fresh_.at(j, j) = fresh_.at(j, j) + as<S>(damping);
+    for (std::size_t j = 0; j < gap_.size(); ++j) {
+      moved_by_itself_[j] = select(lanes, fresh_.at(j, j), moved_by_itself_[j]);
+      fresh_.at(j, j) = fresh_.at(j, j) + as<S>(damping);
+    }
+    for (const Spring& spring : springs_) {
+      S& diagonal = fresh_.at(spring.row, spring.row);
+      diagonal = diagonal + scale_[spring.row] * scale_[spring.row] * yield_of(spring, of);
+    }
     fresh_.factor();
     solve_.take(fresh_, lanes);
   }
@@ -172,7 +192,7 @@ class CouplingSweeps {
     std::vector<S>& pull = of == Coupled::step ? increment_ : pull_;
     for (const CouplingPath& path : paths_.all()) {
       for (std::size_t row = path.first_row; row < path.last_row; ++row) {
-        S sum = of == Coupled::velocities ? S(0.0) : S(0.0) - gap_[row];
+        S sum = of == Coupled::velocities || of == Coupled::reading ? S(0.0) : S(0.0) - gap_[row];
         const S* y = &across_[path.first_number + (row - path.first_row) * path.velocities];
         for (const CouplingPath::Joint& joint : path.reach) {
           const Index first = model_.tree.first_v(joint.slot);
@@ -180,16 +200,19 @@ class CouplingSweeps {
         }
         for (std::size_t c = 0; c < tied.size(); ++c) sum = sum + tied_across_[row * tied.size() + c] * tied[c];
         if (given != nullptr) {
-          const S* g = &begin_[path.first_number + (row - path.first_row) * path.velocities];
-          each_on_path(path, [&](Index v, std::size_t at_row) { sum = sum + g[at_row] * (*given)(v); });
+          sum = sum + opening_of(path, row, *given);
         }
-        pull[row] = scale_[row] * sum;
+        pull[row] = sum;
       }
     }
+    for (const Spring& spring : springs_) {
+      if (of == Coupled::step) pull[spring.row] = pull[spring.row] - (spring.law.yield * lambda_[spring.row] + spring.law.drift * spring.begin);
+    }
+    for (std::size_t j = 0; j < gap_.size(); ++j) pull[j] = scale_[j] * pull[j];
     solve_.solve(pull);
     for (std::size_t j = 0; j < gap_.size(); ++j) pull[j] = scale_[j] * pull[j];
     clear_left();
-    push(pull, left_, [](const S& now, const S& pushed) { return now - pushed; });
+    push(pull, begin_, left_, minus);
     impulse_along_up(
         model_.tree, constants, [&](auto, Index i) { return load<Placement, S>(placement, i); }, gains.up, paths_.reached(),
         [&](auto joint, std::size_t k) { return load_joint(joint, left_, model_.tree.first_v(paths_.reached()[k])); },
@@ -202,51 +225,111 @@ class CouplingSweeps {
   }
   /// r - G^T dlambda, of the solve of a step made last.
   void subtract_push(Field<S>& residual) const {
-    push(increment_, residual, [](const S& now, const S& pushed) { return now - pushed; });
+    push(increment_, begin_, residual, minus);
   }
   /// p + G^T kappa, of the solve for velocities made last: what acts beside couplings, where p is what they have left of it.
-  void add_pull(Field<S>& p) const {
-    push(pull_, p, [](const S& now, const S& pushed) { return now + pushed; });
-  }
+  void add_pull(Field<S>& p) const { push(pull_, begin_, p, plus); }
+  /// p - G^T kappa, likewise: all that there is of the momenta of these velocities.
+  void take_pull(Field<S>& p) const { push(pull_, begin_, p, minus); }
   /// Of a step: before the evaluation that follows a solve, whatever becomes of the correction, in these lanes.
   void take_multipliers(const Mask& lanes, Field<S>& target) {
     if (empty()) return;
-    push(increment_, target, [&](const S& now, const S& pushed) { return select(lanes, now + pushed, now); });
+    push(increment_, begin_, target, [&](const S& now, const S& pushed) { return select(lanes, now + pushed, now); });
     for (std::size_t j = 0; j < gap_.size(); ++j) lambda_[j] = select(lanes, lambda_[j] + increment_[j], lambda_[j]);
   }
 
-  /// What rounding of places makes of the squared energy norm, in squares of epsilon.
+  /// After the last evaluation of a step of h, before bodies are placed at its end: what rows that give way push there. Returns what they took [J].
+  S end(double h) {
+    S loss(0.0);
+    if (!gives_way()) return loss;
+    std::ranges::fill(pull_, S(0.0));
+    for (const Spring& spring : springs_) {
+      const S& share = spring.law.share;
+      loss = loss + row_loss(spring.compliance, h, share, spring.begin, gap_[spring.row]);
+      pull_[spring.row] = (S(1.0) - share) / as<S>(h) * row_impulse(spring.compliance, h, share, spring.begin, gap_[spring.row]);
+    }
+    std::ranges::fill(ends_.flat(), S(0.0));
+    push(pull_, end_, ends_, plus);
+    return loss;
+  }
+  /// Once momenta are those at the end of the step: in these lanes.
+  void add_end(const Mask& lanes, Field<S>& p) const {
+    for (Index row = 0; gives_way() && row < p.rows(); ++row) p(row) = select(lanes, p(row) + ends_(row), p(row));
+  }
+  /// Before velocities are read from p, at q^k, of steps of h: what gaps push at the beginning of a step beyond what they do at its end.
+  void begin_reading(double h, Field<S>& p) {
+    if (!gives_way()) return;
+    find_excess(h, [](const Spring&) { return S(0.0); });
+    push(pull_, begin_, p, plus);
+  }
+  /// The same of steps of h in the place of that of steps of `from`, times `times`: p of a state that goes on with another step.
+  void change_step(double from, double h, double times, Field<S>& p) {
+    if (!gives_way() || from == h) return;
+    for (const auto& [step, sign] : {std::pair(from, 1.0), std::pair(h, -1.0)}) {
+      find_excess(step, [](const Spring&) { return S(0.0); });
+      for (S& pull : pull_) pull = as<S>(sign * times) * pull;
+      push(pull_, begin_, p, plus);
+    }
+  }
+  /// Momenta less all of that: those that are read as velocities v.
+  void take_excess(double h, const Field<S>& v, Field<S>& p) {
+    if (!gives_way()) return;
+    std::vector<S> opening(gap_.size(), S(0.0));
+    for (const CouplingPath& path : paths_.all()) {
+      for (std::size_t row = path.first_row; row < path.last_row; ++row) opening[row] = opening_of(path, row, v);
+    }
+    find_excess(h, [&](const Spring& spring) { return as<S>(spring.compliance.damping) * opening[spring.row]; });
+    push(pull_, begin_, p, minus);
+  }
+  /// Of rows that give way, at q^k [J].
+  S potential() const {
+    S sum(0.0);
+    for (const Spring& spring : springs_) sum = sum + as<S>(0.5 * spring.compliance.stiffness) * spring.begin * spring.begin;
+    return sum;
+  }
+
+  /// What rounding of places and of multipliers makes of the squared energy norm, in squares of epsilon.
   S rounding() const {
     using std::abs;
     S sum(0.0);
     for (std::size_t j = 0; j < gap_.size(); ++j) {
-      const S size = scale_[j] * size_[j];
-      sum = sum + size * size * abs(solve_.inverse(j));
+      const S size = scale_[j] * size_[j], pushed = (lambda_[j] + increment_[j]) / scale_[j];
+      sum = sum + size * size * abs(solve_.inverse(j)) + pushed * pushed * abs(moved_by_itself_[j]);
     }
     return sum;
   }
 
-  /// Sum of the squares of all gaps, each over the root of how far its row would move were its bodies free.
+  /// Sum of the squares of all gaps of rigid rows, each over the root of how far its row would move were its bodies free.
   S openness() const {
     S sum(0.0);
-    for (std::size_t j = 0; j < gap_.size(); ++j) sum = sum + (scale_[j] * gap_[j]) * (scale_[j] * gap_[j]);
+    for (std::size_t j = 0; j < gap_.size(); ++j) {
+      if (rigid_[j]) sum = sum + (scale_[j] * gap_[j]) * (scale_[j] * gap_[j]);
+    }
     return sum;
   }
 
-  /// Of the row that is farthest open beside the size of its mechanism.
+  /// Of the rigid row that is farthest open beside the size of its mechanism.
   S widest_gap() const {
     using std::abs, std::max;
     S widest(0.0);
-    for (std::size_t j = 0; j < gap_.size(); ++j) widest = max(widest, abs(gap_[j]) / size_[j]);
+    for (std::size_t j = 0; j < gap_.size(); ++j) {
+      if (rigid_[j]) widest = max(widest, abs(gap_[j]) / size_[j]);
+    }
     return widest;
   }
 
   std::size_t rows() const { return gap_.size(); }
   const S& gap(std::size_t row) const { return gap_[row]; }
   /// Times h^2; of the step solved last.
-  S multiplier(std::size_t row) const { return lambda_[row] + increment_[row]; }
+  S multiplier(std::size_t row) const {
+    const S all = lambda_[row] + increment_[row];
+    for (const Spring& spring : springs_) {
+      if (spring.row == row) return all / spring.law.share;
+    }
+    return all;
+  }
   /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
-  auto is_held_already(std::size_t row) const { return solve_.inverse(row) == S(0.0); }
+  auto is_held_already(std::size_t row) const { return rigid_[row] && solve_.inverse(row) == S(0.0); }
   const S& pivot(std::size_t row) const { return solve_.pivot(row); }
   const S& size(std::size_t row) const { return size_[row]; }
   const Coupling& coupling_of(std::size_t row) const {
@@ -254,6 +337,44 @@ class CouplingSweeps {
   }
 
  private:
+  /// A row that gives way.
+  struct Spring {
+    std::size_t row;
+    Compliance compliance;
+    S begin{};         // its gap at q^k
+    RowLaw<S> law{};   // of the step there is
+    S excess{};        // (s - 1/2) h, for readings
+  };
+  static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
+  static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
+
+  void find_laws(double h) {
+    for (Spring& spring : springs_) spring.law = row_law(spring.compliance, h, S(1.0) / (scale_[spring.row] * scale_[spring.row]));
+  }
+  /// What a row is able to yield beside its bodies, where this is solved for; infinite: it pushes nothing.
+  S yield_of(const Spring& spring, Coupled of) const {
+    if (of == Coupled::step) return spring.law.yield;
+    const S infinite = as<S>(std::numeric_limits<double>::infinity());
+    return of == Coupled::reading ? S(1.0) / (spring.excess * as<S>(spring.compliance.damping)) : infinite;
+  }
+  /// pull_ of x = -(s - 1/2) h (k g + damped(spring)).
+  template <class Damped>
+  void find_excess(double h, const Damped& damped) {
+    find_laws(h);
+    std::ranges::fill(pull_, S(0.0));
+    for (Spring& spring : springs_) {
+      spring.excess = (spring.law.share - S(0.5)) * as<S>(h);
+      pull_[spring.row] = S(0.0) - spring.excess * (as<S>(spring.compliance.stiffness) * spring.begin + damped(spring));
+    }
+  }
+  /// G v of a row.
+  S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const {
+    const S* g = &begin_[path.first_number + (row - path.first_row) * path.velocities];
+    S sum(0.0);
+    each_on_path(path, [&](Index at_v, std::size_t at_row) { sum = sum + g[at_row] * v(at_v); });
+    return sum;
+  }
+
   static Placement<S> placement_of(const Pose& pose) {
     double numbers[12];
     std::ranges::copy(pose.rotation, numbers);
@@ -415,14 +536,14 @@ class CouplingSweeps {
       for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) visit(first + k, static_cast<std::size_t>(joint.at + k));
     }
   }
-  /// to = combine(to, G^T multipliers) on the paths, row by row.
+  /// to = combine(to, G^T multipliers) on the paths, row by row; numbers: those of G, or J.
   template <class Combine>
-  void push(const std::vector<S>& multipliers, Field<S>& to, const Combine& combine) const {
+  void push(const std::vector<S>& multipliers, const std::vector<S>& numbers, Field<S>& to, const Combine& combine) const {
     for (const CouplingPath& path : paths_.all()) {
       each_on_path(path, [&](Index v, std::size_t at_row) {
         S sum(0.0);
         for (std::size_t j = 0; j < path.rows(); ++j) {
-          sum = sum + multipliers[path.first_row + j] * begin_[path.first_number + j * path.velocities + at_row];
+          sum = sum + multipliers[path.first_row + j] * numbers[path.first_number + j * path.velocities + at_row];
         }
         to(v) = combine(to(v), sum);
       });
@@ -436,6 +557,7 @@ class CouplingSweeps {
   std::vector<S> begin_, end_;   // G at q^k, J at q^k+1: of each row what every velocity of its reach does
   std::vector<S> at_start_;      // coordinates of gears at q^k
   std::vector<S> gap_, size_, scale_, lambda_;
+  std::vector<S> moved_by_itself_;  // diagonal of S, scaled
   std::vector<S> increment_;     // of lambda, by the solve made last
   std::vector<S> pull_;          // likewise, of velocities and positions
   std::vector<S> across_, tied_across_;  // of each row, what J becomes; for velocities of the reach, for coordinates that are tied
@@ -443,6 +565,9 @@ class CouplingSweeps {
   std::vector<S> pulls_;                 // by the solve there is
   std::vector<S> moved_, tied_moved_;    // of each column, how its reach yields: scratch of a factor
   MaskedSolve<S> solve_, fresh_;
+  std::vector<bool> rigid_;              // of each row
+  std::vector<Spring> springs_;
+  Field<S> ends_;                        // what springs push at the end of a step
   bool keeps_scales_ = false;
   Field<S, 6> bias_;             // scratch
   Field<S> left_;                // likewise; of the reach

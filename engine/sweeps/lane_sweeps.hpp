@@ -135,8 +135,9 @@ class LaneSweeps {
   }
   /// Potential energy, after refresh or the end of a step.
   Pack potential() {
-    if constexpr (kEffects) return of_gravity_ + effects_.refresh(work_.placement, q_);
-    return of_gravity_;
+    const Pack stored = of_gravity_ + couplings_.potential();
+    if constexpr (kEffects) return stored + effects_.refresh(work_.placement, q_);
+    return stored;
   }
 
   void find_target() { momentum_target_map(tree_, number(step_), p_, work_.force, work_.momentum_target); }
@@ -146,7 +147,7 @@ class LaneSweeps {
   Evaluated<Pack> start(const Block<Real>& block, Lanes alive) {
     const Lanes due = alive & factor_.due(block, tolerance_);
     Evaluated<Pack> now;
-    couplings_.begin();
+    couplings_.begin(step_);
     if constexpr (kEffects) {
       effects_.begin(block, step_, q_, work_);
       const Evaluation<Pack> moved = start_down(tree_, constants_, work_);
@@ -226,10 +227,15 @@ class LaneSweeps {
   void end([[maybe_unused]] const Block<Real>& block, Lanes done) {
     const Mask moves = L::mask(done);
     if constexpr (kEffects) effects_.end(block, done, work_);
+    if (couplings_.gives_way()) {
+      find_gaps();  // of lanes that were brought back
+      couplings_.end(step_);
+    }
     advance(moves);
     if (tied()) follow_leaders();
     update_momentum(moves);
     if constexpr (kEffects) effects_.add_end(constants_, moves, work_, p_);
+    couplings_.add_end(moves, p_);
     fold_mimics(factor_.ties().mimics(), p_);
     if constexpr (kEffects) effects_.refresh(work_.placement, q_);
   }
@@ -243,11 +249,14 @@ class LaneSweeps {
   void read_velocity() {
     if constexpr (kEffects) {
       effects_->begin_reading(p_);
+      couplings_.begin_reading(step_, p_);
       fold_mimics(factor_.ties().mimics(), p_);
       effects_->with_reading([&](const auto& added) { find_rate(added); });
     } else {
+      couplings_.begin_reading(step_, p_);
       find_rate(NothingAdded{});
     }
+    if (couplings_.gives_way()) couplings_.take_pull(p_);
   }
 
  private:
@@ -384,28 +393,28 @@ class LaneSweeps {
   }
 
   template <class Added>
-  [[gnu::noinline]] void factor_mass(const Added& added) {
+  [[gnu::noinline]] void factor_mass(const Added& added, Coupled of = Coupled::velocities) {
     if (!tied()) {
       find_articulated_inertias(added);
     } else {
       find_articulated_inertias(factor_.fresh_ties().held(added));
       tie(&LaneSweeps::rates);
     }
-    if (coupled()) factor_couplings(Coupled::velocities, mass_gains(), L::mask(~Lanes(0)));
+    if (coupled()) factor_couplings(of, mass_gains(), L::mask(~Lanes(0)));
   }
   template <class Added>
   [[gnu::noinline]] void find_rate(const Added& added) {
     if (tied() || coupled()) {
-      factor_mass(added);
-      return apply_mass_inverse(p_, work_.increment);
+      factor_mass(added, Coupled::reading);
+      return apply_mass_inverse(p_, work_.increment, Coupled::reading);
     }
     const Gains<Pack> gains = mass_gains();
     mass_solve_up(tree_, constants_, work_.placement, p_, work_.articulated, gains.down, gains.inverse, work_.bias, work_.innovation, added);
     rates(gains, work_.increment);
   }
-  [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate) {
+  [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate, Coupled of = Coupled::velocities) {
     impulses_up(mass_gains(), right_side);
-    if (coupled()) give_way(Coupled::velocities, mass_gains(), factor_.fresh_ties(), nullptr);
+    if (coupled()) give_way(of, mass_gains(), factor_.fresh_ties(), nullptr);
     rates(mass_gains(), rate);
     if (tied()) factor_.fresh_ties().complete(rate);
   }

@@ -122,6 +122,7 @@ class Writer {
   }
   bool ties() const { return !draft_.model.mimics.empty(); }
   bool couplings() const { return !draft_.model.couplings.empty(); }
+  bool springs() const { return std::ranges::any_of(draft_.model.couplings, gives_way); }
   bool newton() const { return draft_.options.solver == Solver::newton; }
   bool one_pass() const { return draft_.strategy.one_pass; }
 
@@ -143,7 +144,7 @@ class Writer {
 };
 
 void Writer::first() {
-  if (couplings()) add(When::first, "couplings: no multipliers", "", "couplings", [](Memory m, Slots) { m.couplings.begin(); });
+  if (couplings()) add(When::first, "couplings: no multipliers", "", "couplings", [](Memory m, Slots) { m.couplings.begin(m.options.step); });
   add(When::first, "momentum_target_map", "p, force", "momentum_target", [](Memory m, Slots part) {
     momentum_target_map(m.model.tree, m.options.step, m.state.p, m.work.force, part, m.work.momentum_target);
   }, Way::down);
@@ -358,6 +359,7 @@ void Writer::last() {
   const bool quaternions = std::ranges::any_of(draft_.model.tree.runs, [](const Run& run) { return run.kind != JointKind::screw; });
   if (quaternions) add(When::last, "displacement_map", "motion", "delta", find_coordinates);
   add_end_of_effects(draft_);
+  if (springs()) add(When::last, "couplings: end", "couplings", "couplings", [](Memory m, Slots) { m.couplings.end(m.options.step); });
   if (draft_.strategy.shares_rows) complete();
   add(When::last, "remember", "delta, history", "history",
       [](Memory m, Slots part) { remember(m.work.delta, rows_of(m, part), m.state.history); }, Way::down);
@@ -382,6 +384,7 @@ void Writer::last() {
   }, Way::up);
   add_arrival_of_effects(draft_);
   add_impulses_of_effects(draft_);
+  if (springs()) add(When::last, "couplings: impulses of the end", "couplings, p", "p", [](Memory m, Slots) { m.couplings.add_end(true, m.state.p); });
   if (ties()) add(When::last, "fold_mimics", "p", "p", [](Memory m, Slots) { fold_mimics(m.ties.mimics(), m.state.p); });
   add_reading_of_effects(draft_);
 }

@@ -22,8 +22,9 @@ template <bool kEffects>
 Assembly TreeSweeps<kEffects>::openness() {
   Assembly worst;
   for (std::size_t row = 0; row < couplings_.rows(); ++row) {
+    if (!couplings_.is_rigid(row)) continue;
     const double gap = std::abs(couplings_.gap(row)), relative = gap / couplings_.size(row);
-    if (relative > worst.relative || row == 0) worst = {couplings_.coupling_of(row).name, gap, relative, true};
+    if (relative > worst.relative || worst.coupling.empty()) worst = {couplings_.coupling_of(row).name, gap, relative, true};
   }
   if (worst.relative > kNearEnough) {
     factor_for_start(Coupled::positions);
@@ -35,7 +36,7 @@ Assembly TreeSweeps<kEffects>::openness() {
 template <bool kEffects>
 Index TreeSweeps<kEffects>::widest_coupling() const {
   std::size_t row = 0;
-  while (std::abs(couplings_.gap(row)) / couplings_.size(row) < couplings_.widest_gap()) ++row;
+  while (!couplings_.is_rigid(row) || std::abs(couplings_.gap(row)) / couplings_.size(row) < couplings_.widest_gap()) ++row;
   return static_cast<Index>(&couplings_.coupling_of(row) - model_.couplings.data());
 }
 
@@ -43,7 +44,7 @@ Index TreeSweeps<kEffects>::widest_coupling() const {
 template <bool kEffects>
 bool TreeSweeps<kEffects>::is_closed_to(double enough) const {
   for (std::size_t row = 0; row < couplings_.rows(); ++row) {
-    if (std::abs(couplings_.gap(row)) / couplings_.size(row) > (couplings_.is_held_already(row) ? kMostOpen : enough)) return false;
+    if (couplings_.is_rigid(row) && std::abs(couplings_.gap(row)) / couplings_.size(row) > (couplings_.is_held_already(row) ? kMostOpen : enough)) return false;
   }
   return true;
 }

@@ -125,9 +125,9 @@ void TreeSweeps<kEffects>::complete_rates(Coupled of, Field<double>& v, const Fi
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given) {
+void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given, Coupled of) {
   impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, work_.bias, work_.innovation);
-  complete_rates(Coupled::velocities, v, given);
+  complete_rates(of, v, given);
 }
 
 template <bool kEffects>
@@ -165,28 +165,30 @@ void TreeSweeps<kEffects>::momentum_of(const Field<double>& v, Field<double>& p)
 
 template <bool kEffects>
 const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p, Field<double>& v) {
+  if (!kEffects && !couplings_.gives_way()) {
+    velocity_of(p, v);
+    return p;
+  }
+  read_ = p;
+  if constexpr (kEffects) effects_.begin_reading(read_);
+  couplings_.begin_reading(options_.step, read_);
+  fold_mimics(ties_.mimics(), read_);
+  const bool given = given_.rows() > 0;
   if constexpr (kEffects) {
-    read_ = p;
-    effects_.begin_reading(read_);
-    fold_mimics(ties_.mimics(), read_);
-    const bool given = given_.rows() > 0;
     if (given) {
       effects_.given_velocities(given_);
       spread_mimics<double>(ties_.mimics(), given_);
       momentum_of(given_, work_.momentum);
       for (Index row = 0; row < read_.rows(); ++row) read_(row) -= work_.momentum(row);
     }
-    effects_.with_reading([&](const auto& added) { factor_mass(added); });
-    apply_mass_inverse(read_, v, given ? &given_ : nullptr);
-    if (given) {
-      for (Index row = 0; row < v.rows(); ++row) v(row) += given_(row);
-      momentum_of(v, read_);
-    }
-    return read_;
+    effects_.with_reading([&](const auto& added) { factor_mass(added, Coupled::reading); });
   } else {
-    velocity_of(p, v);
-    return p;
+    factor_mass(NothingAdded{}, Coupled::reading);
   }
+  apply_mass_inverse(read_, v, given ? &given_ : nullptr, Coupled::reading);
+  for (Index row = 0; given && row < v.rows(); ++row) v(row) += given_(row);
+  if (given || couplings_.gives_way()) momentum_of(v, read_);
+  return read_;
 }
 
 template <bool kEffects>

@@ -33,8 +33,9 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::find_potentials(const Field<double>& q) {
   couplings_.place(work_.placement, q);
   if (strategy_.gravity) potential_ = gravity_potential(work_.field, work_.first_moment);
-  if constexpr (kEffects) {
-    effect_potential_ = effects_.refresh(work_.placement, q);
+  if (kEffects || couplings_.gives_way()) {
+    effect_potential_ = couplings_.potential();
+    if constexpr (kEffects) effect_potential_ += effects_.refresh(work_.placement, q);
     potential_ = (strategy_.gravity ? potential_ : 0) + effect_potential_;
   }
 }

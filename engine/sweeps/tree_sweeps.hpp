@@ -76,7 +76,7 @@ class TreeSweeps {
   void arrive(double h, State<double>& state);
   /// Whether the end of a step whose last evaluation this was and the first evaluation of the next can go over each branch together.
   bool can_go_on() const { return valid_.end_momenta; }
-  /// Of gravity, springs and the ground at the last refresh; of these without gravity [J].
+  /// Of gravity, springs, couplings that give way and the ground at the last refresh; of these without gravity [J].
   double potential() const { return potential_; }
   double effect_potential() const { return effect_potential_; }
   /// See Stepper.
@@ -85,9 +85,9 @@ class TreeSweeps {
   void use_gravity(const std::array<double, 3>& gravity);
 
   /// Before all else of a step from these positions, which must stay where they are until it is over.
-  void start(const Field<double>& q) {
+  void start(const Field<double>& q, double h) {
     q_ = &q;
-    couplings_.begin();
+    couplings_.begin(h);
   }
   /// Before the evaluations of a step with effects. scale: what Evaluated::scale gets beside the energy.
   void begin(double scale);
@@ -136,11 +136,25 @@ class TreeSweeps {
 
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.
   void velocity_of(const Field<double>& p, Field<double>& v);
-  void apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given = nullptr);
+  void apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given = nullptr, Coupled of = Coupled::velocities);
   /// A blow in which joints that are held (EffectSweeps::hold_in_blow) change by what is asked of them, in `change`, and no other feels an
   /// impulse but what ties and couplings make of it: all changes, and the impulses that do it.
   void blow(Field<double>& change, Field<double>& impulse);
   void momentum_of(const Field<double>& v, Field<double>& p);
+  /// Those that are read as v.
+  void momentum_read_as(const Field<double>& v, Field<double>& p) {
+    momentum_of(v, p);
+    couplings_.take_excess(options_.step, v, p);
+    fold_mimics(ties_.mimics(), p);
+  }
+  /// What couplings that give way push at the end of a step of h: before it arrives; returns what they took [J]. After it: p gets it.
+  double end_couplings(double h) { return couplings_.end(h); }
+  void add_coupling_ends(double h, Field<double>& p) {
+    couplings_.add_end(true, p);
+    couplings_.change_step(h, options_.step, 1, p);
+  }
+  /// h (p + h/2 Q) of a step of h, where momenta are those of steps of options.step.
+  void change_step(double h, Field<double>& target) { couplings_.change_step(options_.step, h, h, target); }
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
   /// Fills with NaN what no sweep may read before it is written again, once a step is over and the next has not begun. Only where compiled

@@ -15,14 +15,14 @@ namespace {
 
 [[noreturn]] void refuse_coupling(const std::string& name, const std::string& what) { throw InputError(fmt::format("coupling {}: {}", quoted(name), what)); }
 
-std::string default_name(const CouplingSpec& spec) {
+std::string default_name(const CouplingSpec& spec, const Coupling& coupling) {
   if (spec.kind == CouplingKind::gear) {
     std::vector<std::string> joints;
     for (const GearJoint& one : spec.joints) joints.push_back(one.joint);
     return fmt::format("gear of {}", fmt::join(joints, ", "));
   }
   const auto link = [](const std::string& name) { return name.empty() ? std::string("world") : name; };
-  return fmt::format("{} of {} and {}", name_of(spec.kind), link(spec.link_a), link(spec.link_b));
+  return fmt::format("{} of {} and {}", kind_text(coupling), link(spec.link_a), link(spec.link_b));
 }
 
 /// A frame at the point whose z axis is `axis`, and y axis as near to `side` as can be where that is not zero.
@@ -46,8 +46,13 @@ class Coupler {
   }
 
   void add(const CouplingSpec& spec) {
-    Coupling coupling{.name = spec.name.empty() ? default_name(spec) : spec.name, .kind = spec.kind};
+    Coupling coupling;
+    coupling.kind = spec.kind;
+    coupling.shift = spec.shift;
+    coupling.turn = spec.turn;
+    coupling.name = spec.name.empty() ? default_name(spec, coupling) : spec.name;
     if (!names_.insert(coupling.name).second) refuse_coupling(coupling.name, "there is another one of this name; expected each once; give it a name");
+    check_compliance(coupling);
     if (spec.kind == CouplingKind::gear) {
       add_terms(spec, coupling);
     } else {
@@ -59,6 +64,20 @@ class Coupler {
   Model take() { return std::move(model_); }
 
  private:
+  static void check_compliance(const Coupling& coupling) {
+    for (const Compliance* law : {&coupling.shift, &coupling.turn}) {
+      for (const double number : {law->stiffness, law->damping}) {
+        if (!(number >= 0) || !std::isfinite(number)) {
+          refuse_coupling(coupling.name, fmt::format("a stiffness or damping of it is {}; expected a finite number, zero or more", number));
+        }
+      }
+      const auto uses = [&](const GapRow& row) { return &compliance_of(coupling, row) == law; };
+      if (law->gives_way() && std::ranges::none_of(rows_of(coupling.kind), uses)) {
+        refuse_coupling(coupling.name, fmt::format("a {} has nothing that {}; expected no stiffness or damping of that", name_of(coupling.kind),
+                                                   law == &coupling.turn ? "turns" : "shifts"));
+      }
+    }
+  }
   LinkPlace place_of(const std::string& coupling, const std::string& link) const {
     if (link.empty() || link == "world") return {};
     const auto found = model_.names.link.find(link);

@@ -40,6 +40,7 @@ struct CouplingSpec {
   double length = 0;                     // of a rod [m]; 0: as far apart as both points are while all coordinates are zero
   std::vector<GearJoint> joints{};       // of a gear: sum of ratio q + offset = 0
   double offset = 0;
+  Compliance shift{}, turn{};            // springs and dampers in the place of rows (layout/couplings.hpp); none: they are rigid
 };
 
 /// The model with these couplings beside those that it has. Throws InputError for a link or joint that there is not, a coupling of a body with

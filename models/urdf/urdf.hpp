@@ -12,7 +12,7 @@
 //   visuals with their materials            visuals and visual_faults (models/urdf/urdf_visuals.hpp); with a density also the mass of links
 //                                           that have neither inertial nor collision shapes
 //   loops: <loop_joint>, <loop>,            couplings (models/urdf/urdf_loops.hpp)
-//   <drake:ball_constraint>, <gazebo><joint>
+//   <drake:ball_constraint>, <drake:linear_spring_damper>, <gazebo><joint>
 //   sensors, all else                       not read; what a reader should know of it is told (models/urdf/urdf_vocabulary.hpp)
 //
 // A tree has one root link. With Base::fixed it is fixed to the world. With Base::floating a free joint called "base"

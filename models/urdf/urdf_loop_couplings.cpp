@@ -40,6 +40,8 @@ CouplingSpec coupling_of(const UrdfLoop& loop, const Model& model, const std::ve
   spec.frame_b = link_b.inverse() * end_b;
   spec.frame_a.linear() *= turn;
   spec.frame_b.linear() *= turn;
+  spec.length = loop.length;
+  spec.shift = loop.spring;
   return spec;
 }
 

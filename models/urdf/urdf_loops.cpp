@@ -73,6 +73,8 @@ class LoopReader {
         take(*element, [&](UrdfLoop& loop) { read_ends(*element, loop); });
       } else if (name == "drake:ball_constraint") {
         take(*element, [&](UrdfLoop& loop) { read_ball_constraint(*element, loop); });
+      } else if (name == "drake:linear_spring_damper") {
+        take(*element, [&](UrdfLoop& loop) { read_spring_damper(*element, loop); });
       } else if (name == "gazebo") {
         for (const XMLElement* joint = element->FirstChildElement("joint"); joint; joint = joint->NextSiblingElement("joint")) {
           take(*joint, [&](UrdfLoop& loop) { read_sdf(*joint, loop); });
@@ -110,7 +112,8 @@ class LoopReader {
   void give_name(UrdfLoop& loop) {
     const auto link = [](const std::string& name) { return name.empty() ? std::string("world") : name; };
     const bool named = !loop.name.empty();
-    if (!named) loop.name = fmt::format("{} of {} and {}", name_of(loop.kind), link(loop.link_a), link(loop.link_b));
+    const char* const kind = loop.spring.gives_way() ? "spring" : name_of(loop.kind);
+    if (!named) loop.name = fmt::format("{} of {} and {}", kind, link(loop.link_a), link(loop.link_b));
     const std::string wanted = loop.name;
     for (int number = 2; !names_.insert(loop.name).second; ++number) loop.name = fmt::format("{}_{}", wanted, number);
     if (named && loop.name != wanted) report_.warn(loop.line, fmt::format("{}: another loop has its name; called {}", loop.owner, quoted(loop.name)));
@@ -283,15 +286,41 @@ class LoopReader {
     loop.kind = CouplingKind::ball;
     look_at(element, loop, {},
             {"drake:ball_constraint_body_A", "drake:ball_constraint_body_B", "drake:ball_constraint_p_AP", "drake:ball_constraint_p_BQ"});
-    const auto read = [&](const char* body, const char* point, std::string& link, Isometry& frame) {
-      const XMLElement &names = part(element, loop, body), &says = part(element, loop, point);
-      look_at(names, loop, {"name"}, {});
+    read_point(element, loop, "drake:ball_constraint_body_A", "drake:ball_constraint_p_AP", loop.link_a, loop.in_a);
+    read_point(element, loop, "drake:ball_constraint_body_B", "drake:ball_constraint_p_BQ", loop.link_b, loop.in_b);
+  }
+
+  /// A link and a point in its frame, as Drake writes them.
+  void read_point(const XMLElement& element, const UrdfLoop& loop, const char* body, const char* point, std::string& link, Isometry& frame) const {
+    const XMLElement &names = part(element, loop, body), &says = part(element, loop, point);
+    look_at(names, loop, {"name"}, {});
+    look_at(says, loop, {"value"}, {});
+    link = link_of(names, loop, names.Attribute("name"));
+    frame = placed_at(numbers_.three(loop.owner, says, "value"), {});
+  }
+
+  void read_spring_damper(const XMLElement& element, UrdfLoop& loop) const {
+    constexpr const char *kLength = "drake:linear_spring_damper_free_length", *kStiffness = "drake:linear_spring_damper_stiffness",
+                         *kDamping = "drake:linear_spring_damper_damping";
+    loop.kind = CouplingKind::rod;
+    look_at(element, loop, {},
+            {"drake:linear_spring_damper_body_A", "drake:linear_spring_damper_body_B", "drake:linear_spring_damper_p_AP", "drake:linear_spring_damper_p_BQ",
+             kLength, kStiffness, kDamping});
+    read_point(element, loop, "drake:linear_spring_damper_body_A", "drake:linear_spring_damper_p_AP", loop.link_a, loop.in_a);
+    read_point(element, loop, "drake:linear_spring_damper_body_B", "drake:linear_spring_damper_p_BQ", loop.link_b, loop.in_b);
+    const auto number = [&](const char* name) {
+      const XMLElement& says = part(element, loop, name);
       look_at(says, loop, {"value"}, {});
-      link = link_of(names, loop, names.Attribute("name"));
-      frame = placed_at(numbers_.three(loop.owner, says, "value"), {});
+      const double value = numbers_.one(loop.owner, says, "value");
+      if (value < 0 || (value == 0 && name == kLength)) {
+        fail(says, loop, fmt::format("<{}> is {}", name, value), name == kLength ? "a length above zero" : "zero or more", "correct it");
+      }
+      return value;
     };
-    read("drake:ball_constraint_body_A", "drake:ball_constraint_p_AP", loop.link_a, loop.in_a);
-    read("drake:ball_constraint_body_B", "drake:ball_constraint_p_BQ", loop.link_b, loop.in_b);
+    loop.length = number(kLength);
+    loop.spring.stiffness = number(kStiffness);
+    loop.spring.damping = number(kDamping);
+    if (!loop.spring.gives_way()) fail(element, loop, "it neither pulls nor damps", "a stiffness or damping above zero", "give one");
   }
 
   /// The numbers that an element of SDFormat holds as its text.

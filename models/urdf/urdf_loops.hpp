@@ -1,6 +1,6 @@
 // models/urdf/urdf_loops.hpp
-// What URDF files say of closed loops: a tree, and joints between links that it does not know of. URDF itself has no word for them; these are
-// what programs write.
+// What URDF files say of closed loops: a tree, and joints and springs between links that it does not know of. URDF itself has no word for them;
+// these are what programs write.
 //
 //   <loop_joint name type>                          two ends, each with its own frame in its link; <axis xyz>, 1 0 0 where it is not given
 //     <link1 link xyz rpy/> <link2 link xyz rpy/>     Isaac Sim, of type spherical (its documentation writes <link1> twice, read as well), and
@@ -12,6 +12,8 @@
 //     <predecessor link> <origin/>, <successor link> <origin/>; or <predecessor_origin/>, <successor_origin/> beside them
 //   <drake:ball_constraint>                         Drake, MultibodyPlant::AddBallConstraint
 //     <drake:ball_constraint_body_A name/>, _body_B; <drake:ball_constraint_p_AP value="x y z"/>, _p_BQ
+//   <drake:linear_spring_damper>                    Drake, a spring and damper between two points; likewise, and
+//     <drake:linear_spring_damper_free_length value/>, _stiffness, _damping
 //   <gazebo> <joint name type>                      Gazebo: a joint of SDFormat inside <gazebo>
 //     <parent>, <child>, <pose relative_to> in the child's frame where nothing else is said, <axis> <xyz expressed_in>, <axis2>;
 //     both ends meet where all coordinates are zero
@@ -49,10 +51,12 @@ struct UrdfLoop {
   bool turned_as_at_zero = false;               // in_b says where the end is, not how it is turned
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX(), second_axis = Eigen::Vector3d::UnitY();  // of length 1; the second of a universal joint
   std::optional<std::string> axis_in{};         // a link in whose frame they are given, empty: the world; else in the joint's
+  double length = 0;                            // of a spring [m]
+  Compliance spring{};
 };
 
-/// False for a ball and a weld.
-inline bool has_axis(CouplingKind kind) { return kind != CouplingKind::ball && kind != CouplingKind::weld; }
+/// False for a ball, a weld and a rod.
+inline bool has_axis(CouplingKind kind) { return kind != CouplingKind::ball && kind != CouplingKind::weld && kind != CouplingKind::rod; }
 
 /// All loops of the file that are understood, in its order; names that are there already are lengthened. What is not is a warning.
 std::vector<UrdfLoop> loops_of(const UrdfStructure& robot, UrdfReport& report);

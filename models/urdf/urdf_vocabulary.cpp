@@ -60,6 +60,7 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"loop_joint",        "robot",                           loops,     many,       "",                            ""},
     {"loop",              "robot",                           loops,     many,       "",                            ""},
     {"drake:ball_constraint",    "robot",                    loops,     many,       "",                            ""},
+    {"drake:linear_spring_damper", "robot",                  loops,     many,       "",                            ""},
 
     {"coupling",          "robot",                           lost,      many,       "",                            ""},
     {"cable",             "robot",                           lost,      many,       "",                            ""},
@@ -68,7 +69,6 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"traits",            "joint",                           lost,      many,       "",                            ""},
     {"joint_properties",  "joint",                           lost,      many,       "",                            ""},
     {"drake:linear_bushing_rpy", "robot",                    lost,      many,       "",                            ""},
-    {"drake:linear_spring_damper", "robot",                  lost,      many,       "",                            ""},
     {"drake:tendon_constraint",  "robot",                    lost,      many,       "",                            ""},
     {"drake:mimic",       "joint",                           lost,      many,       "",                            ""},
     {"contact",           "link",                            lost,      many,       "",                            ""},

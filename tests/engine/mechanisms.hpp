@@ -64,6 +64,43 @@ inline Model bricard() {
   return coupled(builder.build(), {{.name = "last", .kind = CouplingKind::hinge, .link_a = parent, .link_b = "world", .at = PointAndAxis{end, {1, 0, 0}}}});
 }
 
+/// Andrews' squeezing mechanism: seven bodies in the plane, three of them pinned to one point, and a spring; a benchmark of the IVP test set, with
+/// its numbers and names (Schiehlen, Multibody Systems Handbook, 1990). Its crank is driven by 0.033 N m.
+inline Model squeezer() {
+  constexpr double xa = -0.06934, ya = -0.00227, xb = -0.03635, yb = 0.03273, xc = 0.014, yc = 0.072;
+  constexpr double d = 28e-3, da = 115e-4, e = 2e-2, ea = 1421e-5, zf = 2e-2, fa = 1421e-5, rr = 7e-3, ra = 92e-5, ss = 35e-3, sa = 1874e-5, sb = 1043e-5,
+                   sc = 18e-3, sd = 2e-2, zt = 4e-2, ta = 2308e-5, tb = 916e-5, u = 4e-2, ua = 1228e-5, ub = 449e-5;
+  using V = Eigen::Vector3d;
+  TreeBuilder builder("squeezer");
+  const auto add = [&](const std::string& name, const std::string& parent, V at, double mass, V center, double inertia) {
+    LinkSpec link;
+    link.name = name;
+    link.parent = parent;
+    link.joint = name + "_joint";
+    link.axis = V::UnitZ();
+    link.placement.translation() = at;
+    link.inertia = {mass, center, inertia * Eigen::Matrix3d::Identity()};
+    builder.add(link);
+  };
+  add("K1", "", {0, 0, 0}, 0.04325, {ra, 0, 0}, 2.194e-6);
+  add("K2", "K1", {rr, 0, 0}, 0.00365, {-da, 0, 0}, 4.410e-7);
+  add("K3", "", {xb, yb, 0}, 0.02373, {sb, -sa, 0}, 5.255e-6);
+  add("K5", "", {xa, ya, 0}, 0.07050, {ta, tb, 0}, 1.169e-5);
+  add("K4", "K5", {zt, 0, 0}, 0.00706, {0, -(e - ea), 0}, 5.667e-7);
+  add("K7", "", {xa, ya, 0}, 0.05498, {-ub, -ua, 0}, 1.912e-5);
+  add("K6", "K7", {0, -u, 0}, 0.00706, {zf - fa, 0, 0}, 5.667e-7);
+  const auto pin = [&](const std::string& name, const std::string& link, V at) {
+    CouplingSpec spec{.name = name, .kind = CouplingKind::ball, .link_a = "K2", .link_b = link};
+    spec.frame_a.translation() = V(-d, 0, 0);
+    spec.frame_b.translation() = at;
+    return spec;
+  };
+  CouplingSpec spring{.name = "spring", .kind = CouplingKind::rod, .link_a = "", .link_b = "K3", .length = 7785e-5, .shift = {4530, 0}};
+  spring.frame_a.translation() = V(xc, yc, 0);
+  spring.frame_b.translation() = V(sd, -sc, 0);
+  return coupled(builder.build(), {pin("E", "K3", {0, -ss, 0}), pin("G", "K4", {0, -e, 0}), pin("H", "K6", {zf, 0, 0}), spring});
+}
+
 /// n rods in a regular polygon in the plane, free to move, closed by a hinge.
 inline Model ring(int n) {
   TreeBuilder builder("ring");

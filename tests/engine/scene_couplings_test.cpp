@@ -45,6 +45,27 @@ TEST_CASE("couplings of every type are read, leave what they say, and stay close
   CHECK(simulation.energy().total() == Approx(before).margin(1e-3));
 }
 
+TEST_CASE("couplings that give way are read, hold no coordinate, and keep the account") {
+  struct Case {
+    const char* text;
+    Index rows, freedom;
+  };
+  const auto c = GENERATE(Case{"{type: spring, between: [coupler, rocker], points: [[2, 0, 1], [-0.5, 0, 1]], stiffness: 100, damping: 1}", 1, 3},
+                          Case{"{type: spring, between: [world, rocker], points: [[2, 0, 1], [-1, 0, 2]], stiffness: 100, rest: 0}", 3, 3},
+                          Case{"{type: hinge, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 1, 0], turning_stiffness: 1e3}", 5, 1},
+                          Case{"{type: weld, between: [coupler, rocker], point: [2, 0, 2], stiffness: 1e5, turning_stiffness: 10, turning_damping: 1}", 6, 3},
+                          Case{"{type: gear, joints: {crank: 2, rocker: -1}, turning_stiffness: 50, turning_damping: 2}", 1, 3});
+  CAPTURE(c.text);
+  const Scene scene = with(c.text);
+  const Mobility mobility = mobility_of(scene.model, scene.initial.positions);
+  CHECK(mobility.rows == c.rows);
+  CHECK(mobility.freedom == c.freedom);
+  Simulation simulation(scene);
+  const double before = simulation.energy().total();
+  REQUIRE(simulation.run(500).ok());
+  CHECK(simulation.energy().total() + simulation.effect_work().taken() == Approx(before).margin(1e-3));
+}
+
 TEST_CASE("a start that is open is closed if it is told to be, or nearly closed already") {
   CHECK_THROWS_WITH(with(kPin, "initial: {positions: {crank: 0.4}}"),
                     Catch::Contains("coupling \"pin\" is open by") && Catch::Contains("assemble: true"));
@@ -75,6 +96,10 @@ TEST_CASE("what a coupling cannot be is told with its line") {
   CHECK_THAT(message("{type: hinge, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 0, 0]}"), Catch::Contains("no length"));
   CHECK_THAT(message("{type: ball, between: [coupler, coupler], point: [2, 0, 2]}"), Catch::Contains("both of its links"));
   CHECK_THAT(message("{type: gear, joints: {crank: 0, rocker: 1}}"), Catch::Contains("other than zero"));
+  CHECK_THAT(message("{type: spring, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]]}"), Catch::Contains("neither pulls nor damps"));
+  CHECK_THAT(message("{type: spring, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: -2}"), Catch::Contains("stiffness"));
+  CHECK_THAT(message("{type: ball, between: [coupler, rocker], point: [2, 0, 2], turning_stiffness: 3}"), Catch::Contains("nothing that turns"));
+  CHECK_THAT(message("{type: rod, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: 3}"), Catch::Contains("stiffness"));
 }
 
 }  // namespace

@@ -50,6 +50,7 @@ class Maker {
     make_model();
     make_start();
     if (scene_.number % 6 == 4) make_couplings();
+    if (scene_.number % 6 == 1 || scene_.number % 12 == 10) make_springs();
     measure();
     make_effects();
     choose_length();
@@ -188,29 +189,6 @@ class Maker {
     Index free = model().degrees_of_freedom() - 1;
     std::vector<CouplingSpec> specs;
     const std::vector<Isometry> poses = poses_at_start();
-    const auto couple = [&](CouplingKind kind, Index a, Index b) {
-      CouplingSpec spec;
-      spec.name = fmt::format("coupling{}", specs.size() + 1);
-      spec.kind = kind;
-      spec.link_a = a == 0 ? "world" : model().names.body[static_cast<std::size_t>(a)];
-      spec.link_b = model().names.body[static_cast<std::size_t>(b)];
-      Isometry where = Isometry::Identity();
-      where.linear() = random.rotation().toRotationMatrix();
-      where.translation() = poses[static_cast<std::size_t>(b)] * Vector3d(random.uniform(0, 0.3), random.uniform(-0.1, 0.1), 0);
-      Isometry other = where;
-      if (kind == CouplingKind::rod) {
-        const Vector3d apart = random.uniform(0.1, 0.5) * (random.rotation() * Vector3d::UnitZ());
-        other.translation() += apart;
-        spec.length = apart.norm();
-      }
-      const auto in_link = [&](Index slot, const std::string& link, const Isometry& frame) {
-        const Isometry in_body = slot == 0 ? Isometry(Isometry::Identity()) : isometry(model().names.link.at(link).in_body);
-        return Isometry((poses[static_cast<std::size_t>(slot)] * in_body).inverse() * frame);
-      };
-      spec.frame_a = in_link(a, spec.link_a, other);
-      spec.frame_b = in_link(b, spec.link_b, where);
-      specs.push_back(spec);
-    };
     for (int tries = 0; tries < 6 && specs.size() < 3; ++tries) {
       const auto kind = static_cast<CouplingKind>(random.below(kCouplingKinds));
       const auto rows = static_cast<Index>(rows_of(kind).size());
@@ -234,7 +212,8 @@ class Maker {
         free -= 1;
         continue;
       }
-      couple(kind, a, b);
+      specs.push_back(coupling_at_start(random, poses, kind, a, b));
+      specs.back().name = fmt::format("coupling{}", specs.size());
       free -= rows;
       if (random.uniform(0, 1) < 0.15) {
         specs.push_back(specs.back());
@@ -246,6 +225,71 @@ class Maker {
     if (starts_singular(*tied, random)) return;
     scene_.model = std::move(tied);
     scene_.coupled = true;
+  }
+
+  /// One to three couplings that give way: springs between points, some damped, bushings, soft joints of all kinds; stretched at the start where
+  /// they have a length. Numbers of its own, likewise.
+  void make_springs() {
+    Random random(scene_.seed * 86028121 + scene_.number);
+    const auto log_uniform = [&](double low, double high) { return std::exp(random.uniform(std::log(low), std::log(high))); };
+    const std::vector<Isometry> poses = poses_at_start();
+    const Index bodies = model().tree.bodies();
+    const auto is_link = [&](Index slot) { return slot == 0 || model().names.link.contains(model().names.body[static_cast<std::size_t>(slot)]); };
+    std::vector<CouplingSpec> specs;
+    for (int tries = 0; tries < 6 && specs.size() < 1 + scene_.number % 3; ++tries) {
+      const CouplingKind kind = random.uniform(0, 1) < 0.5 ? CouplingKind::rod : static_cast<CouplingKind>(random.below(kCouplingKinds - 1));
+      const auto a = static_cast<Index>(random.below(static_cast<std::uint64_t>(bodies) + 1));
+      const auto b = static_cast<Index>(1 + random.below(static_cast<std::uint64_t>(bodies)));
+      if (a == b || !is_link(a) || !is_link(b)) continue;
+      CouplingSpec spec = coupling_at_start(random, poses, kind, a, b);
+      spec.name = fmt::format("spring{}", specs.size() + 1);
+      if (kind == CouplingKind::rod) spec.length *= random.uniform(0.7, 1.3);
+      // gains follow from what the rows move
+      spec.shift.stiffness = spec.turn.stiffness = 1;
+      const Model sprung = coupled(*scene_.model, {spec});
+      const reference::PlainTree tree = reference::plain_tree(sprung);
+      const reference::PlainCouplings rows(tree, sprung.couplings, reference::Rows::giving_way);
+      const reference::PlainScene at = plain();
+      const Eigen::MatrixXd C = rows.opening(at.q);
+      const VectorXd moved = (C * at.mass_matrix().ldlt().solve(C.transpose())).diagonal().tail(static_cast<Eigen::Index>(rows_of(kind).size()));
+      if (!(moved.minCoeff() > 1e-9)) continue;  // they cannot open
+      const double w = std::min(log_uniform(0.01, scene_.stiff ? 4 : 0.3) / h_, scene_.stiff ? 1e4 : 500);
+      const double damped = random.uniform(0, 1) < 0.5 ? 0 : std::min(2 * log_uniform(0.02, 1), (scene_.stiff ? 4 : 0.3) / (w * h_));
+      double shift = 0, turn = 0;  // what moves most
+      for (Eigen::Index row = 0; row < moved.size(); ++row) {
+        const GapKind of = rows_of(kind)[static_cast<std::size_t>(row)].kind;
+        double& most = of == GapKind::product ? turn : shift;
+        most = std::max(most, moved[row]);
+      }
+      spec.shift = shift > 0 ? Compliance{w * w / shift, damped * w / shift} : Compliance{};
+      spec.turn = turn > 0 ? Compliance{w * w / turn, damped * w / turn} : Compliance{};
+      specs.push_back(spec);
+    }
+    if (!specs.empty()) scene_.model = std::make_shared<const Model>(coupled(*scene_.model, specs));
+  }
+
+  /// A coupling of two bodies, closed at the start; of a rod as far apart as they are.
+  CouplingSpec coupling_at_start(Random& random, const std::vector<Isometry>& poses, CouplingKind kind, Index a, Index b) const {
+    CouplingSpec spec;
+    spec.kind = kind;
+    spec.link_a = a == 0 ? "world" : model().names.body[static_cast<std::size_t>(a)];
+    spec.link_b = model().names.body[static_cast<std::size_t>(b)];
+    Isometry where = Isometry::Identity();
+    where.linear() = random.rotation().toRotationMatrix();
+    where.translation() = poses[static_cast<std::size_t>(b)] * Vector3d(random.uniform(0, 0.3), random.uniform(-0.1, 0.1), 0);
+    Isometry other = where;
+    if (kind == CouplingKind::rod) {
+      const Vector3d apart = random.uniform(0.1, 0.5) * (random.rotation() * Vector3d::UnitZ());
+      other.translation() += apart;
+      spec.length = apart.norm();
+    }
+    const auto in_link = [&](Index slot, const std::string& link, const Isometry& frame) {
+      const Isometry in_body = slot == 0 ? Isometry(Isometry::Identity()) : isometry(model().names.link.at(link).in_body);
+      return Isometry((poses[static_cast<std::size_t>(slot)] * in_body).inverse() * frame);
+    };
+    spec.frame_a = in_link(a, spec.link_a, other);
+    spec.frame_b = in_link(b, spec.link_b, where);
+    return spec;
   }
 
   /// Whether rows of couplings follow from each other at the start that do not elsewhere: a structure that gives way there at first, and then

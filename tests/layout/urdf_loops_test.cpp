@@ -233,10 +233,8 @@ TEST_CASE("what a loop says beside its place is told") {
     CHECK(told_of(pair_and(xml)) == warnings);
     CHECK(parse_urdf(pair_and(xml), "test.urdf").couplings.size() == 1);
   }
-  for (const char* lost : {"linear_spring_damper", "tendon_constraint"}) {
-    CHECK(told_of(pair_and(fmt::format("<drake:{}/>", lost))) ==
-          Strings{fmt::format("test.urdf:2: known but not simulated: <drake:{}>; the robot moves as if it were not there", lost)});
-  }
+  CHECK(told_of(pair_and("<drake:tendon_constraint/>")) ==
+        Strings{"test.urdf:2: known but not simulated: <drake:tendon_constraint>; the robot moves as if it were not there"});
   CHECK(told_of(pair_and("<drake:linear_bushing_rpy/>")) ==
         Strings{"test.urdf:2: known but not simulated: <drake:linear_bushing_rpy>; the robot moves as if it were not there; where it closes a loop, write a "
                 "<drake:ball_constraint> or a <loop_joint>"});
@@ -258,6 +256,11 @@ TEST_CASE("nothing of a loop is misspelled, repeated or added in silence") {
     <drake:ball_constraint_body_A name="a"/><drake:ball_constraint_body_B name="b"/>
     <drake:ball_constraint_p_AP value="0 0 1"/><drake:ball_constraint_p_BQ value="0 0 1"/>
   </drake:ball_constraint>
+  <drake:linear_spring_damper>
+    <drake:linear_spring_damper_body_A name="a"/><drake:linear_spring_damper_body_B name="b"/>
+    <drake:linear_spring_damper_p_AP value="0 0 1"/><drake:linear_spring_damper_p_BQ value="0 0 1"/>
+    <drake:linear_spring_damper_free_length value="2"/><drake:linear_spring_damper_stiffness value="3"/><drake:linear_spring_damper_damping value="0.5"/>
+  </drake:linear_spring_damper>
   <gazebo>
     <joint name="p" type="universal">
       <parent>a</parent><child>b</child><pose relative_to="a" degrees="false">0 0 1 0 0 1</pose>
@@ -266,7 +269,7 @@ TEST_CASE("nothing of a loop is misspelled, repeated or added in silence") {
     </joint>
   </gazebo>)";
   REQUIRE(told_of(pair_and(loops)) == Strings{});
-  REQUIRE(parse_urdf(pair_and(loops), "test.urdf").couplings.size() == 6);
+  REQUIRE(parse_urdf(pair_and(loops), "test.urdf").couplings.size() == 7);
   tinyxml2::XMLDocument document;
   REQUIRE(document.Parse(robot(loops).c_str()) == tinyxml2::XML_SUCCESS);
   std::vector<tinyxml2::XMLElement*> elements{document.RootElement()};
@@ -302,10 +305,33 @@ TEST_CASE("nothing of a loop is misspelled, repeated or added in silence") {
     element->InsertEndChild(text);
     CHECK(told());
     element->DeleteChild(text);
-    if (name == "drake:ball_constraint") continue;  // two of them are two
+    if (name == "drake:ball_constraint" || name == "drake:linear_spring_damper") continue;  // two of them are two
     auto* again = element->Parent()->InsertAfterChild(element, element->DeepClone(&document));
     CHECK(told());
     element->Parent()->DeleteChild(again);
+  }
+}
+
+TEST_CASE("a spring and damper of Drake is one between two points") {
+  const auto spring = [](const std::string& length, const std::string& stiffness, const std::string& damping) {
+    const auto part = [](const char* name, const std::string& says) { return fmt::format("<drake:linear_spring_damper_{} {}/>", name, says); };
+    return "<drake:linear_spring_damper>" + part("body_A", "name=\"a\"") + part("p_AP", "value=\"0.1 0.2 0.3\"") + part("body_B", "name=\"world\"") +
+           part("p_BQ", "value=\"1 0 0\"") + part("free_length", "value=\"" + length + "\"") + part("stiffness", "value=\"" + stiffness + "\"") +
+           part("damping", "value=\"" + damping + "\"") + "</drake:linear_spring_damper>";
+  };
+  const Model model = parse_urdf(pair_and(spring("2", "30", "0.5")), "test.urdf");
+  REQUIRE(model.couplings.size() == 1);
+  const Coupling& found = model.couplings[0];
+  CHECK(model.warnings.empty());
+  CHECK(found.name == "spring of a and world");
+  CHECK(found.kind == CouplingKind::rod);
+  CHECK(found.length == 2);
+  CHECK(found.shift.stiffness == 30);
+  CHECK(found.shift.damping == 0.5);
+  CHECK(found.frame_b.shift[0] == 1);
+  for (const std::string& wrong : {spring("0", "30", "1"), spring("2", "-1", "1"), spring("2", "0", "0"), spring("2", "x", "0")}) {
+    CHECK(told_of(pair_and(wrong)).size() == 1);
+    CHECK(parse_urdf(pair_and(wrong), "test.urdf").couplings.empty());
   }
 }
 

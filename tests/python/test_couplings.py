@@ -24,6 +24,19 @@ def test_a_loop_stays_closed_and_keeps_its_energy() -> None:
     assert sim.energy.total == pytest.approx(energy, abs=1e-3)
 
 
+def test_a_spring_between_bodies_bears_a_weight() -> None:
+    model = linden.load("ball-chain:1")
+    spring = {"type": "spring", "name": "hung", "between": ["world", "link1"], "points": [[0, 0, 1], [0, 0, 0]], "stiffness": 1e3, "damping": 30}
+    sim = linden.Simulation(model, couplings=[spring], effects={"gravity": [0, 0, -9.81]})
+    (hung,) = sim.couplings
+    assert hung.name == "hung"
+    assert hung.gaps == pytest.approx([0], abs=1e-12)
+    batch = linden.Batch(sim.scene, instances=3, observe=["q"])
+    sim.run(200)
+    batch.step(200)
+    np.testing.assert_allclose(batch.q, np.tile(sim.q, (3, 1)), atol=1e-9)
+
+
 def test_instances_of_a_batch_move_as_a_simulation_does() -> None:
     scene = linden.load_scene(SCENES / "four_bar.yaml")
     batch, sim = linden.Batch(scene, instances=5, observe=["q"]), linden.Simulation(scene)

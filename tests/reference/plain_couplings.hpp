@@ -3,6 +3,7 @@
 //
 //   u' = A^-1 (f - C^T lambda),   C A^-1 C^T lambda = C A^-1 f + C' u      the pseudo-inverse: rows may follow from others
 //   positions and velocities are put back onto the gaps, least in A, after every step
+//   rows that give way: f = -C^T (k g + d C v)
 //
 // source  Featherstone, Rigid Body Dynamics Algorithms, 8.1; Hairer, Wanner, Solving Ordinary Differential Equations II, VII.2 (projection)
 #pragma once
@@ -14,11 +15,40 @@
 
 namespace linden::reference {
 
+/// Which rows of couplings are meant.
+enum class Rows { rigid, giving_way };
+
 class PlainCouplings {
  public:
-  PlainCouplings(const PlainTree& tree, std::vector<Coupling> couplings) : tree_(tree), couplings_(std::move(couplings)) {}
+  PlainCouplings(const PlainTree& tree, std::vector<Coupling> couplings, Rows which = Rows::rigid) : tree_(tree), couplings_(std::move(couplings)) {
+    Eigen::Index at = 0;
+    for (const Coupling& one : couplings_) {
+      for (const GapRow& row : rows_of(one.kind)) {
+        const Compliance& law = compliance_of(one, row);
+        if (law.gives_way() == (which == Rows::giving_way)) {
+          rows_.push_back(at);
+          laws_.push_back(law);
+        }
+        ++at;
+      }
+    }
+  }
 
-  bool empty() const { return couplings_.empty(); }
+  bool empty() const { return rows_.empty(); }
+  /// Of each row.
+  const std::vector<Compliance>& laws() const { return laws_; }
+
+  /// -C^T (k g + d C v), of rows that give way.
+  VectorXd force(const VectorXd& q, const VectorXd& v) const {
+    const MatrixXd C = opening(q);
+    VectorXd pull = gaps(q);
+    const VectorXd rate = C * v;
+    for (std::size_t k = 0; k < laws_.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      pull[row] = laws_[k].stiffness * pull[row] + laws_[k].damping * rate[row];
+    }
+    return -(C.transpose() * pull);
+  }
 
   /// Gaps of positions q varied by eps.
   template <class T>
@@ -55,8 +85,8 @@ class PlainCouplings {
         case CouplingKind::gear: break;
       }
     }
-    VectorX<T> result(static_cast<Eigen::Index>(all.size()));
-    for (std::size_t k = 0; k < all.size(); ++k) result[static_cast<Eigen::Index>(k)] = all[k];
+    VectorX<T> result(static_cast<Eigen::Index>(rows_.size()));
+    for (std::size_t k = 0; k < rows_.size(); ++k) result[static_cast<Eigen::Index>(k)] = all[static_cast<std::size_t>(rows_[k])];
     return result;
   }
   VectorXd gaps(const VectorXd& q) const { return gaps<double>(q, VectorXd::Zero(tree_.velocities)); }
@@ -103,6 +133,8 @@ class PlainCouplings {
 
   const PlainTree& tree_;
   std::vector<Coupling> couplings_;
+  std::vector<Eigen::Index> rows_;  // those that are meant, among all
+  std::vector<Compliance> laws_;
 };
 
 }  // namespace linden::reference

@@ -94,7 +94,15 @@ class PlainScene {
       k[servo.row] += servo.stiffness;
     }
     const VectorXd inertia = row_inertia();
-    return std::max(k.cwiseQuotient(inertia).cwiseSqrt().maxCoeff(), c.cwiseQuotient(inertia).maxCoeff());
+    double stiffest = std::max(k.cwiseQuotient(inertia).cwiseSqrt().maxCoeff(), c.cwiseQuotient(inertia).maxCoeff());
+    if (fixed_->springs.empty()) return stiffest;
+    const VectorXd moved = moved_freely(fixed_->springs.opening(q), mass_matrix());
+    for (std::size_t row = 0; row < fixed_->springs.laws().size(); ++row) {
+      const Compliance& law = fixed_->springs.laws()[row];
+      const double yields = moved[static_cast<Eigen::Index>(row)];
+      stiffest = std::max({stiffest, std::sqrt(law.stiffness * yields), law.damping * yields});
+    }
+    return stiffest;
   }
 
   /// Kinetic energy and potential of gravity, springs and ground [J].
@@ -119,6 +127,10 @@ class PlainScene {
         sum += half_square(1 / spring.stiffness, torque.norm());
       }
     }
+    const VectorXd gaps = fixed_->springs.gaps(q);
+    for (std::size_t row = 0; row < fixed_->springs.laws().size(); ++row) {
+      sum += half_square(fixed_->springs.laws()[row].stiffness, gaps[static_cast<Eigen::Index>(row)]);
+    }
     for (const PlainContact& contact : fixed_->forces.contacts(motions)) {
       sum += half_square(fixed_->effects.ground->stiffness, std::min(contact.gap, 0.0));
     }
@@ -128,7 +140,8 @@ class PlainScene {
  private:
   struct Fixed {
     Fixed(const Model& model, const Effects& given, const std::array<double, 3>& g)
-        : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g), couplings(tree, model.couplings) {
+        : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g), couplings(tree, model.couplings),
+          springs(tree, model.couplings, Rows::giving_way) {
       std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.velocities), nullptr);
       for (const Mimic& mimic : mimics) follows[static_cast<std::size_t>(mimic.follower_v)] = &mimic;
       Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom() - static_cast<Index>(effects.motions.size()));
@@ -165,7 +178,7 @@ class PlainScene {
     std::vector<Mimic> mimics;
     Vector3d gravity;
     PlainForces forces;
-    PlainCouplings couplings;
+    PlainCouplings couplings, springs;  // rows that are rigid, and that give way
     MatrixXd Z, G;  // [nv x u], [nv x w]
     std::vector<std::pair<Index, PlainCurve>> moved;  // by row
     std::vector<double> breaks;  // times at which a force jumps or bends [s]
@@ -190,7 +203,7 @@ class PlainScene {
     const std::vector<BodyMotion> motions = body_motions(tree(), at, rate);
     const MatrixXd M = mass_matrix_at(motions), & Z = fixed_->Z;
     const VectorXd given = fixed_->G * given_derivatives(2, within(t));
-    const VectorXd force = fixed_->forces.force(at, rate, within(t), motions, true) - bias_force(tree(), motions) - M * given;
+    const VectorXd force = fixed_->forces.force(at, rate, within(t), motions, true) + spring_force(at, rate) - bias_force(tree(), motions) - M * given;
     const Eigen::LDLT<MatrixXd> A(Z.transpose() * M * Z);
     VectorXd u = A.solve(Z.transpose() * force);
     if (!fixed_->couplings.empty()) {
@@ -198,6 +211,10 @@ class PlainScene {
       u -= response * PlainCouplings::multipliers(CZ * response, CZ * u + C * given + fixed_->couplings.bend(at, rate), moved_freely(C, M));
     }
     return given + Z * u;
+  }
+
+  VectorXd spring_force(const VectorXd& at, const VectorXd& rate) const {
+    return fixed_->springs.empty() ? VectorXd(VectorXd::Zero(tree().velocities)) : fixed_->springs.force(at, rate);
   }
 
   /// Positions and velocities back onto the gaps, as near as the mass matrix measures.
@@ -288,7 +305,7 @@ class PlainScene {
     MatrixXd M = mass_matrix_at(motions);
     M.diagonal() += dt * c + dt * dt * k;
     const Eigen::LLT<MatrixXd> A(Z.transpose() * M * Z);
-    const VectorXd force = fixed_->forces.force(q, v, t, motions, false) - bias_force(tree(), motions) - dt * k.cwiseProduct(v);
+    const VectorXd force = fixed_->forces.force(q, v, t, motions, false) + spring_force(q, v) - bias_force(tree(), motions) - dt * k.cwiseProduct(v);
     VectorXd given = VectorXd::Zero(fixed_->G.cols());  // changes of velocity
     for (std::size_t j = 0; j < fixed_->moved.size(); ++j) {
       const auto& [row, curve] = fixed_->moved[j];
