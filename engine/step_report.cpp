@@ -63,7 +63,8 @@ std::string describe(const StepReport& report, const Model& model, double step) 
   const auto slot = static_cast<std::size_t>(report.slot);
   const std::string where = fmt::format("body \"{}\" (joint \"{}\")", model.names.body[slot], model.names.joint[slot]);
   const std::string advice = fmt::format("try a step below {:.3g} s", step / 4);
-  const std::string coupling = model.couplings.empty() ? "" : model.couplings[static_cast<std::size_t>(report.coupling)].name;
+  std::string coupling;  // that is farthest open
+  if (rigid_row_count(model.couplings) > 0) coupling = model.couplings[static_cast<std::size_t>(report.coupling)].name;
   switch (report.status) {
     case StepStatus::past_pi:
       return fmt::format("{} turns by half a turn or more within a step of {:.3g} s, even split: {}", where, step, advice);

@@ -6,6 +6,7 @@
 
 #include "engine/effects/plane_frame.hpp"
 #include "engine/effects/stiff_contact.hpp"
+#include "engine/sweeps/coupling_yields.hpp"
 #include "kernels/effects/laws.hpp"
 #include "kernels/tree/articulated_inertia_up.hpp"
 #include "kernels/tree/increment_down.hpp"
@@ -144,6 +145,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
     rotor.allocate(tree.shape.velocities);
     for (const Armature& one : effects.armature) rotor(one.row) += one.inertia;
   }
+  row_yields = linden::row_yields(model, effects.armature);
 }
 
 void EffectPlan::place_joints(const Model& model) {

@@ -51,6 +51,7 @@ struct EffectPlan {
   std::vector<double> mass;         // that a force on each body is taken to move [kg]
   Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
+  std::vector<double> row_yields;   // of couplings (engine/sweeps/coupling_yields.hpp); empty where none gives way
   GroundPlan ground;                // no points without ground
   std::vector<LoadedBody> loaded_bodies;  // sorted by slot
 

@@ -30,31 +30,28 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "engine/sweeps/coupling_paths.hpp"
+#include "engine/sweeps/coupling_springs.hpp"
 #include "kernels/block/evaluate_down.hpp"
-#include "kernels/couplings/compliance.hpp"
 #include "kernels/couplings/gap_map.hpp"
 #include "kernels/couplings/impulse_along_up.hpp"
 #include "kernels/couplings/masked_solve.hpp"
 #include "kernels/tree/mimic.hpp"
+#include "kernels/values/lanes_of.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
-
-/// What is solved for: the displacement of a step, with J and gaps at its end; velocities at q^k, with G and no gaps, and those that momenta
-/// are read as, where dampers of rows that give way have their say; positions that close the gaps there.
-enum class Coupled : std::uint8_t { step, velocities, reading, positions };
 
 template <class S>
 class CouplingSweeps {
  public:
   using Mask = typename LanesOf<S>::Mask;
 
-  explicit CouplingSweeps(const Model& model) : model_(model), paths_(model) {
+  /// yields: of each row (coupling_yields.hpp); empty where none gives way.
+  CouplingSweeps(const Model& model, std::span<const double> yields) : model_(model), paths_(model) {
     if (empty()) return;
     const Shape& shape = model.tree.shape;
     pose_.allocate(shape.slots);
@@ -71,7 +68,7 @@ class CouplingSweeps {
         size_[path.first_row + row] = as<S>(kind == GapKind::product || kind == GapKind::sum ? 1.0 : path.length);
         const Compliance& compliance = compliance_of(*path.coupling, rows_of(path.coupling->kind)[row]);
         rigid_.push_back(!compliance.gives_way());
-        if (compliance.gives_way()) springs_.push_back({path.first_row + row, compliance});
+        if (compliance.gives_way()) springs_.add(path.first_row + row, compliance, yields.empty() ? 0 : yields[path.first_row + row]);
       }
       for (const CouplingPath::Joint& joint : path.reach) slots_.push_back(joint.slot);
     }
@@ -100,7 +97,7 @@ class CouplingSweeps {
       for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
     }
     look([&](Index slot) { return load<Placement, S>(pose_, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
-    for (Spring& spring : springs_) spring.begin = gap_[spring.row];
+    springs_.place(gap_);
   }
   /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
   void keep_scales(bool keep) { keeps_scales_ = keep; }
@@ -109,7 +106,7 @@ class CouplingSweeps {
   void begin(double h) {
     std::ranges::fill(lambda_, S(0.0));
     std::ranges::fill(increment_, S(0.0));
-    find_laws(h);
+    springs_.begin(h);
   }
 
   /// Gaps at the end of a displacement, and how joints change them there.
@@ -168,10 +165,7 @@ class CouplingSweeps {
       moved_by_itself_[j] = select(lanes, fresh_.at(j, j), moved_by_itself_[j]);
       fresh_.at(j, j) = fresh_.at(j, j) + as<S>(damping);
     }
-    for (const Spring& spring : springs_) {
-      S& diagonal = fresh_.at(spring.row, spring.row);
-      diagonal = diagonal + scale_[spring.row] * scale_[spring.row] * yield_of(spring, of);
-    }
+    springs_.each_yield(of, [&](std::size_t j, const S& yield) { fresh_.at(j, j) = fresh_.at(j, j) + scale_[j] * scale_[j] * yield; });
     fresh_.factor();
     solve_.take(fresh_, lanes);
   }
@@ -205,9 +199,7 @@ class CouplingSweeps {
         pull[row] = sum;
       }
     }
-    for (const Spring& spring : springs_) {
-      if (of == Coupled::step) pull[spring.row] = pull[spring.row] - (spring.law.yield * lambda_[spring.row] + spring.law.drift * spring.begin);
-    }
+    if (of == Coupled::step) springs_.complete(lambda_, pull);
     for (std::size_t j = 0; j < gap_.size(); ++j) pull[j] = scale_[j] * pull[j];
     solve_.solve(pull);
     for (std::size_t j = 0; j < gap_.size(); ++j) pull[j] = scale_[j] * pull[j];
@@ -240,14 +232,8 @@ class CouplingSweeps {
 
   /// After the last evaluation of a step of h, before bodies are placed at its end: what rows that give way push there. Returns what they took [J].
   S end(double h) {
-    S loss(0.0);
-    if (!gives_way()) return loss;
-    std::ranges::fill(pull_, S(0.0));
-    for (const Spring& spring : springs_) {
-      const S& share = spring.law.share;
-      loss = loss + row_loss(spring.compliance, h, share, spring.begin, gap_[spring.row]);
-      pull_[spring.row] = (S(1.0) - share) / as<S>(h) * row_impulse(spring.compliance, h, share, spring.begin, gap_[spring.row]);
-    }
+    if (!gives_way()) return S(0.0);
+    const S loss = springs_.end(h, gap_, pull_);
     std::ranges::fill(ends_.flat(), S(0.0));
     push(pull_, end_, ends_, plus);
     return loss;
@@ -259,14 +245,14 @@ class CouplingSweeps {
   /// Before velocities are read from p, at q^k, of steps of h: what gaps push at the beginning of a step beyond what they do at its end.
   void begin_reading(double h, Field<S>& p) {
     if (!gives_way()) return;
-    find_excess(h, [](const Spring&) { return S(0.0); });
+    springs_.excess(h, {}, pull_);
     push(pull_, begin_, p, plus);
   }
   /// The same of steps of h in the place of that of steps of `from`, times `times`: p of a state that goes on with another step.
   void change_step(double from, double h, double times, Field<S>& p) {
     if (!gives_way() || from == h) return;
     for (const auto& [step, sign] : {std::pair(from, 1.0), std::pair(h, -1.0)}) {
-      find_excess(step, [](const Spring&) { return S(0.0); });
+      springs_.excess(step, {}, pull_);
       for (S& pull : pull_) pull = as<S>(sign * times) * pull;
       push(pull_, begin_, p, plus);
     }
@@ -278,15 +264,11 @@ class CouplingSweeps {
     for (const CouplingPath& path : paths_.all()) {
       for (std::size_t row = path.first_row; row < path.last_row; ++row) opening[row] = opening_of(path, row, v);
     }
-    find_excess(h, [&](const Spring& spring) { return as<S>(spring.compliance.damping) * opening[spring.row]; });
+    springs_.excess(h, opening, pull_);
     push(pull_, begin_, p, minus);
   }
   /// Of rows that give way, at q^k [J].
-  S potential() const {
-    S sum(0.0);
-    for (const Spring& spring : springs_) sum = sum + as<S>(0.5 * spring.compliance.stiffness) * spring.begin * spring.begin;
-    return sum;
-  }
+  S potential() const { return springs_.potential(); }
 
   /// What rounding of places and of multipliers makes of the squared energy norm, in squares of epsilon.
   S rounding() const {
@@ -321,52 +303,21 @@ class CouplingSweeps {
   std::size_t rows() const { return gap_.size(); }
   const S& gap(std::size_t row) const { return gap_[row]; }
   /// Times h^2; of the step solved last.
-  S multiplier(std::size_t row) const {
-    const S all = lambda_[row] + increment_[row];
-    for (const Spring& spring : springs_) {
-      if (spring.row == row) return all / spring.law.share;
-    }
-    return all;
-  }
+  S multiplier(std::size_t row) const { return springs_.whole(row, lambda_[row] + increment_[row]); }
   /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
   auto is_held_already(std::size_t row) const { return rigid_[row] && solve_.inverse(row) == S(0.0); }
   const S& pivot(std::size_t row) const { return solve_.pivot(row); }
   const S& size(std::size_t row) const { return size_[row]; }
+  /// How far a unit of impulse along a row opens it, with the factor made last and other rows left out.
+  S yield(std::size_t row) const { return moved_by_itself_[row] / (scale_[row] * scale_[row]); }
   const Coupling& coupling_of(std::size_t row) const {
     return *std::ranges::find_if(paths_.all(), [row](const CouplingPath& path) { return row < path.last_row; })->coupling;
   }
 
  private:
-  /// A row that gives way.
-  struct Spring {
-    std::size_t row;
-    Compliance compliance;
-    S begin{};         // its gap at q^k
-    RowLaw<S> law{};   // of the step there is
-    S excess{};        // (s - 1/2) h, for readings
-  };
   static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
   static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
 
-  void find_laws(double h) {
-    for (Spring& spring : springs_) spring.law = row_law(spring.compliance, h, S(1.0) / (scale_[spring.row] * scale_[spring.row]));
-  }
-  /// What a row is able to yield beside its bodies, where this is solved for; infinite: it pushes nothing.
-  S yield_of(const Spring& spring, Coupled of) const {
-    if (of == Coupled::step) return spring.law.yield;
-    const S infinite = as<S>(std::numeric_limits<double>::infinity());
-    return of == Coupled::reading ? S(1.0) / (spring.excess * as<S>(spring.compliance.damping)) : infinite;
-  }
-  /// pull_ of x = -(s - 1/2) h (k g + damped(spring)).
-  template <class Damped>
-  void find_excess(double h, const Damped& damped) {
-    find_laws(h);
-    std::ranges::fill(pull_, S(0.0));
-    for (Spring& spring : springs_) {
-      spring.excess = (spring.law.share - S(0.5)) * as<S>(h);
-      pull_[spring.row] = S(0.0) - spring.excess * (as<S>(spring.compliance.stiffness) * spring.begin + damped(spring));
-    }
-  }
   /// G v of a row.
   S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const {
     const S* g = &begin_[path.first_number + (row - path.first_row) * path.velocities];
@@ -566,7 +517,7 @@ class CouplingSweeps {
   std::vector<S> moved_, tied_moved_;    // of each column, how its reach yields: scratch of a factor
   MaskedSolve<S> solve_, fresh_;
   std::vector<bool> rigid_;              // of each row
-  std::vector<Spring> springs_;
+  CouplingSprings<S> springs_;
   Field<S> ends_;                        // what springs push at the end of a step
   bool keeps_scales_ = false;
   Field<S, 6> bias_;             // scratch

@@ -50,7 +50,7 @@ class LaneSweeps {
 
   explicit LaneSweeps(const BlockSetup<Real>& setup)
       : tree_(setup.model.tree), options_(setup.options), constants_(setup.constants), step_(options_.step), effects_(setup),
-        couplings_(setup.model), factor_(setup.model, setup.holds_factor) {
+        couplings_(setup.model, setup.plan.row_yields), factor_(setup.model, setup.holds_factor) {
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     if constexpr (!kEffects) kept_.allocate(shape);

@@ -36,7 +36,13 @@ Assembly TreeSweeps<kEffects>::openness() {
 template <bool kEffects>
 Index TreeSweeps<kEffects>::widest_coupling() const {
   std::size_t row = 0;
-  while (!couplings_.is_rigid(row) || std::abs(couplings_.gap(row)) / couplings_.size(row) < couplings_.widest_gap()) ++row;
+  double widest = -1;
+  for (std::size_t k = 0; k < couplings_.rows(); ++k) {
+    const double open = std::abs(couplings_.gap(k)) / couplings_.size(k);
+    if (!couplings_.is_rigid(k) || open <= widest) continue;
+    widest = open;
+    row = k;
+  }
   return static_cast<Index>(&couplings_.coupling_of(row) - model_.couplings.data());
 }
 

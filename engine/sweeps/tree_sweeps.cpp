@@ -20,7 +20,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       options_(options),
       strategy_(strategy_of(model, options, plan)),
       ties_(model.mimics, model.tree),
-      couplings_(model),
+      couplings_(model, plan.row_yields),
       effects_(plan, model),
       tree_(model.tree) {
   work_.allocate(model.tree.shape);

@@ -19,39 +19,36 @@
 // source  Marsden, West, Discrete mechanics and variational integrators (2001), 2.3.1, 3.2 (discrete d'Alembert principle)
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
+#include "kernels/effects/joint_impulses.hpp"
 #include "kernels/values/scalar.hpp"
 #include "layout/couplings.hpp"
 
 namespace linden {
 
-template <class S>
 struct RowLaw {
-  S share, yield, drift;
+  double share, yield, drift;
 };
 
-/// free: how far the row moves by a unit of impulse were its bodies free. Either number of the compliance is above zero.
-template <class S>
-LINDEN_INLINE RowLaw<S> row_law(const Compliance& compliance, double h, const S& free) {
-  using std::max;
-  const S k = as<S>(h * h * compliance.stiffness), d = as<S>(std::abs(h) * compliance.damping), half(0.5), one(1.0);
-  const S share = max(half, one - half / (free * (k + d)));
-  const S both = share * k + d;
-  return {share, one / (share * both), ((one - share) * k - d) / both};
+/// moves: how far the row opens by a unit of impulse along it (engine/sweeps/coupling_yields.hpp). Either number of the compliance is above
+/// zero.
+LINDEN_INLINE RowLaw row_law(const Compliance& compliance, double h, double moves) {
+  const double k = h * h * compliance.stiffness, d = std::abs(h) * compliance.damping;
+  const double share = begin_share(moves * (k + d)), both = share * k + d;
+  return {share, 1 / (share * both), ((1 - share) * k - d) / both};
 }
 
 /// lambda of a step.
 template <class S>
-LINDEN_INLINE S row_impulse(const Compliance& compliance, double h, const S& share, const S& begin, const S& end) {
-  return as<S>(-h * h * compliance.stiffness) * (begin + share * (end - begin)) - as<S>(h * compliance.damping) * (end - begin);
+LINDEN_INLINE S row_impulse(const Compliance& compliance, double h, double share, const S& begin, const S& end) {
+  return as<S>(-h * h * compliance.stiffness) * (begin + as<S>(share) * (end - begin)) - as<S>(h * compliance.damping) * (end - begin);
 }
 
 /// What the row took in a step [J].
 template <class S>
-LINDEN_INLINE S row_loss(const Compliance& compliance, double h, const S& share, const S& begin, const S& end) {
-  return (as<S>(compliance.stiffness) * (share - S(0.5)) + as<S>(compliance.damping / h)) * (end - begin) * (end - begin);
+LINDEN_INLINE S row_loss(const Compliance& compliance, double h, double share, const S& begin, const S& end) {
+  return as<S>(compliance.stiffness * (share - 0.5) + compliance.damping / h) * (end - begin) * (end - begin);
 }
 
 }  // namespace linden

@@ -245,7 +245,7 @@ class Maker {
       spec.name = fmt::format("spring{}", specs.size() + 1);
       if (kind == CouplingKind::rod) spec.length *= random.uniform(0.7, 1.3);
       // gains follow from what the rows move
-      spec.shift.stiffness = spec.turn.stiffness = 1;
+      for (const GapRow& row : rows_of(kind)) (row.kind == GapKind::product ? spec.turn : spec.shift).stiffness = 1;
       const Model sprung = coupled(*scene_.model, {spec});
       const reference::PlainTree tree = reference::plain_tree(sprung);
       const reference::PlainCouplings rows(tree, sprung.couplings, reference::Rows::giving_way);
