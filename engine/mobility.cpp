@@ -19,7 +19,8 @@ Mobility mobility_of(const Model& model, std::span<const double> positions) {
     found.rows += static_cast<Index>(state.gaps.size());
     found.held_already += static_cast<Index>(std::ranges::count(state.redundant, true));
   }
-  found.freedom -= rigid_row_count(model.couplings) - found.held_already;
+  found.giving_way = found.rows - rigid_row_count(model.couplings);
+  found.freedom -= found.rows - found.giving_way - found.held_already;
   return found;
 }
 

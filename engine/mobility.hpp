@@ -14,7 +14,7 @@ namespace linden {
 struct Mobility {
   std::vector<CouplingState> couplings;  // without forces
   Assembly openness;
-  Index rows = 0, held_already = 0;  // of all couplings; of these those that follow from others
+  Index rows = 0, held_already = 0, giving_way = 0;  // of all couplings; of these those that follow from others, and that give way
   Index freedom = 0;                 // degrees that are left
 };
 

@@ -211,7 +211,7 @@ class Printer {
                               massless == 0 ? "" : fmt::format("; {} massless", grouped(massless))));
     const auto followers = static_cast<std::int64_t>(model_.mimics.size());
     const std::string mimics = followers == 0 ? "" : fmt::format(" less {}", counted(followers, "mimic joint"));
-    const Index held = mobility_.rows - mobility_.held_already;
+    const Index held = mobility_.rows - mobility_.giving_way - mobility_.held_already;
     const std::string couplings = held == 0 ? "" : fmt::format(" less {} that couplings hold", grouped(held));
     row("freedom", fmt::format("{} of freedom; {} in q, {} in v{}{}", counted(mobility_.freedom, "degree"),
                                counted(tree.shape.positions, "row"), grouped(tree.shape.velocities), mimics, couplings));

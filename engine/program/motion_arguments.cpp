@@ -72,7 +72,10 @@ std::string model_text(const ModelArguments& arguments, const Model& model) {
   const std::string name = model.names.model.starts_with(arguments.model)
                                ? printable(model.names.model)
                                : printable(fmt::format("{} ({})", model.names.model, arguments.model));
-  const std::string tied = model.couplings.empty() ? "" : fmt::format(" but for {}", counted(std::ssize(model.couplings), "coupling"));
+  const std::ptrdiff_t soft = std::ranges::count_if(model.couplings, [](const Coupling& one) { return rigid_row_count({&one, 1}) == 0; });
+  const std::ptrdiff_t rigid = std::ssize(model.couplings) - soft;
+  std::string tied = rigid == 0 ? "" : fmt::format(" but for {}", counted(rigid, "coupling"));
+  if (soft > 0) tied += fmt::format(" with {} that {} way", counted(soft, "coupling"), soft == 1 ? "gives" : "give");
   return fmt::format("{}: {}, {} of freedom{}, {:.5g} kg, {}", name, counted(model.tree.bodies(), "body"),
                      counted(model.degrees_of_freedom(), "degree"), tied, model.constants.subtree_mass(0), base_of(model));
 }

@@ -353,7 +353,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
     }
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
   }
-  part.work.couplings = sweeps_.end_couplings(h);
+  if (sweeps_.gives_way()) account_.work.couplings += sweeps_.end_couplings(h);
   history = std::min(history + 1, kHistory);
   const bool known = !has_stages_ && state.last_step(0) != 0;
   state.last_step(0) = h;
@@ -365,11 +365,11 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   if constexpr (kEffects) {
     part.work.of<Ground>() -= effects_.ground_stored();
     part.kinetic = solve_.mean_kinetic();
+    account_.add(part);
     time_ += h;
     for (Index row = 0; effects_.plan().joints && row < state.p.rows(); ++row) state.p(row) += work_.end_impulse(row);
   }
-  account_.add(part);
-  sweeps_.add_coupling_ends(h, state.p);
+  if (sweeps_.gives_way()) sweeps_.add_coupling_ends(h, state.p);
   fold_mimics(sweeps_.mimics(), state.p);
   if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
   if constexpr (kEffects) {

@@ -147,6 +147,8 @@ class TreeSweeps {
     couplings_.take_excess(options_.step, v, p);
     fold_mimics(ties_.mimics(), p);
   }
+  /// Whether some coupling does.
+  bool gives_way() const { return couplings_.gives_way(); }
   /// What couplings that give way push at the end of a step of h: before it arrives; returns what they took [J]. After it: p gets it.
   double end_couplings(double h) { return couplings_.end(h); }
   void add_coupling_ends(double h, Field<double>& p) {

@@ -221,11 +221,14 @@ double motion_leaves(const Walk& walk) {
 
 }  // namespace
 
+/// Speed that what rests may read [rad/s, m/s].
+constexpr double kRests = 3e-6;
+
 void check_energy(const EverydayScene& scene, const Walk& walk, Differences& found) {
   if (walk.nodes.size() < 8) return;
   const double h = scene.options.step;
   // of the change of velocities that smooth forces and friction give in a step
-  double second_order = 0, kinetic = 0, most = 0, least = 0, moved = 0;
+  double second_order = 0, resting = 0, kinetic = 0, most = 0, least = 0, moved = 0;
   const std::size_t stride = std::max<std::size_t>(1, walk.nodes.size() / 24);
   for (std::size_t k = 0; k < walk.nodes.size(); ++k) {
     const Node& node = walk.nodes[k];
@@ -239,6 +242,7 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
     VectorXd change = h * plain.acceleration();
     const VectorXd inertia = plain.row_inertia();
     double sum = 0.5 * change.dot(plain.mass_matrix() * change);
+    if (k == 0) resting = 0.5 * kRests * kRests * plain.mass_matrix().trace();
     for (const JointFriction& friction : scene.effects.friction) {
       sum += 0.5 * std::pow(h * friction.force, 2) / inertia[friction.row];
     }
@@ -267,7 +271,7 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
   const double rounding = (1e-8 + 4e-10 * static_cast<double>(walk.nodes.size())) * scale;
   // features of a terrain take over from one another; the engine itself tells what gives more than a hundredth
   constexpr double kRough = 0.02;
-  const double allowed = (scene.rough ? kRough * scale : 0) + rounding + 8 * (second_order + stops_leave(scene, walk)) + friction_leaves(scene, walk) + motion_leaves(walk);
+  const double allowed = (scene.rough ? kRough * scale : 0) + rounding + resting + 8 * (second_order + stops_leave(scene, walk)) + friction_leaves(scene, walk) + motion_leaves(walk);
 
   const double first = walk.nodes[0].balance();
   // a blow may be booked a step or two after it: what stays counts
@@ -330,7 +334,7 @@ class Reader {
     }
     most_ = (2 * kinetic * inertia_.cwiseInverse()).cwiseSqrt();
     known_ = 1e-8 * most_;
-    known_.array() += 3e-6;
+    known_.array() += kRests;
     first_.resize(known_.size());
     count_.setOnes(known_.size());
     for (Index i = 1; i < plain_.tree().slots(); ++i) {
