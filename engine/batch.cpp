@@ -52,7 +52,8 @@ BatchOf<Real>::BatchOf(std::shared_ptr<const Model> model, std::int64_t size, co
                        const BatchOptions& computed) {
   check_batch(size, options, computed);
   data_ = std::make_unique<Data>(required(std::move(model)), size, options, effects, computed);
-  if (!effects.motions.empty() && data_->has_start.empty()) reset_all([](std::int64_t, std::span<double>, std::span<double>) {});
+  const bool pushed = !data_->plan.row_yields.empty();  // at rest momenta are what stretched springs leave in them
+  if ((pushed || !effects.motions.empty()) && data_->has_start.empty()) reset_all([](std::int64_t, std::span<double>, std::span<double>) {});
 }
 
 template <class Real>

@@ -176,6 +176,22 @@ TEST_CASE("A state with stretched springs reads as it was set") {
   }
 }
 
+TEST_CASE("What starts with a stretched spring, however stiff, begins at rest and moves the same alone and in a batch") {
+  TreeBuilder builder("stretched");
+  builder.add(ball_of("body", 2, JointType::prismatic));
+  CouplingSpec spec{.name = "spring", .kind = CouplingKind::rod, .link_a = "", .link_b = "body", .length = 0.5, .shift = {1e7, 10}};
+  spec.frame_a.translation() = Eigen::Vector3d(0, 0, 0.6);
+  const Model model = coupled(builder.build(), {spec});
+  Simulation simulation(model, {.step = 1e-2});
+  Batch batch(model, 3, {.step = 1e-2});
+  CHECK(std::abs(simulation.velocities()[0]) < 1e-12);
+  CHECK(std::abs(batch.observe().velocities()(1, 0)) < 1e-12);
+  REQUIRE(simulation.run(100).ok());
+  batch.step(100);
+  CHECK(batch.positions()(1, 0) == Approx(simulation.positions()[0]).epsilon(1e-10));
+  CHECK(simulation.positions()[0] == Approx(0.1).epsilon(1e-3));
+}
+
 TEST_CASE("A spring without a length pulls where both points meet") {
   TreeBuilder builder("anchored");
   builder.add(ball_of("body", 2, JointType::free));
@@ -196,7 +212,10 @@ TEST_CASE("Two rotors on a soft shaft turn against each other at its frequency")
     rotor.inertia.about_center = (name == "a" ? 0.1 : 0.3) * Eigen::Matrix3d::Identity();
     builder.add(rotor);
   }
-  CouplingSpec shaft{.name = "shaft", .kind = CouplingKind::gear, .joints = {{"a_joint", 1}, {"b_joint", -1}}, .turn = {30, 0}};
+  CouplingSpec shaft;
+  shaft.kind = CouplingKind::gear;
+  shaft.joints = {{"a_joint", 1}, {"b_joint", -1}};
+  shaft.turn.stiffness = 30;
   Simulation simulation(coupled(builder.build(), {shaft}), weightless(1e-3));
   simulation.set_velocities(std::vector{1.0, 0.0});
   const double w = std::sqrt(30 * (1 / 0.1 + 1 / 0.3));
