@@ -57,7 +57,7 @@ Contacts touching(const Model& model) {
 /// Robots, and random trees of joints of all kinds.
 std::vector<Model> asked_models() {
   std::vector<Model> models;
-  for (const std::string& file : all_robots()) {
+  for (const std::string& file : tree_robots()) {
     models.push_back(load_urdf(file, Base::fixed));
     if (file.find("hand") == std::string::npos) models.push_back(load_urdf(file, Base::floating));
   }

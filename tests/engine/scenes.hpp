@@ -36,6 +36,13 @@ inline std::vector<std::string> all_robots() {
   return files;
 }
 
+/// Those of them that are trees: without closed loops, so that any velocities are possible ones.
+inline std::vector<std::string> tree_robots() {
+  std::vector<std::string> files = all_robots();
+  std::erase_if(files, [](const std::string& file) { return !load_urdf(file).couplings.empty(); });
+  return files;
+}
+
 /// Instructions that this processor has and this build knows.
 inline std::vector<Instructions> all_instructions() {
   std::vector<Instructions> list;

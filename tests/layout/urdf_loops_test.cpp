@@ -2,6 +2,7 @@
 #include "models/urdf/urdf_loops.hpp"
 
 #include <catch2/catch.hpp>
+#include <fstream>
 #include <numbers>
 
 #include "layout/couplings.hpp"
@@ -342,7 +343,10 @@ TEST_CASE("a link under two joints is told how a loop is written") {
 TEST_CASE("no robot at hand has loops that its file does not say") {
   for (const std::string& file : robot_files()) {
     CAPTURE(file);
-    CHECK(load_urdf(file).couplings.empty());
+    std::ifstream text(file);
+    std::size_t said = 0;
+    for (std::string line; std::getline(text, line);) said += line.find("<loop_joint name=") != line.npos ? 1 : 0;
+    CHECK(load_urdf(file).couplings.size() == said);
   }
 }
 
