@@ -76,6 +76,13 @@ std::array<double, 36> yield_of(const Model& model, Index slot) {
   return numbers;
 }
 
+/// Radius of gyration of a body about its joint, of one without inertia that of all that hangs on it [m].
+double size_of_body(const Model& model, Index slot) {
+  const Matrix inertia = felt_inertia(model, slot);
+  const double mass = inertia(3, 3);
+  return mass > 0 ? std::sqrt(std::max(0.0, inertia.topLeftCorner<3, 3>().trace()) / (3 * mass)) : 0;
+}
+
 double norm(const std::array<double, 3>& a) { return std::hypot(a[0], a[1], a[2]); }
 
 class PathMaker {
@@ -89,6 +96,10 @@ class PathMaker {
     path_.yield_b = yield_of(model_, coupling_.slot_b);
     path_.gear_yield = 0;
     mark_path();
+    // where all frames are at one point, bodies are what there is to measure by
+    for (const Index slot : {coupling_.slot_a, coupling_.slot_b}) {
+      if (slot != 0) path_.length = std::max(path_.length, size_of_body(model_, slot));
+    }
     list();
     for (const GearTerm& term : coupling_.terms) add_term(term);
     return std::move(path_);

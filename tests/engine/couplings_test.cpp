@@ -300,6 +300,29 @@ TEST_CASE("Random starts of a driven mechanism are closed around its drive") {
   CHECK(batch.summary().frozen == 0);
 }
 
+TEST_CASE("A free body is held to the world at its own origin") {
+  for (const CouplingKind kind : {CouplingKind::ball, CouplingKind::hinge, CouplingKind::weld, CouplingKind::cylindrical, CouplingKind::slider}) {
+    CAPTURE(name_of(kind));
+    TreeBuilder builder("held");
+    LinkSpec body = bar("body", "", {0, 0, 0}, {1, 0, 0});
+    body.type = JointType::free;
+    builder.add(body);
+    CouplingSpec spec;
+    spec.kind = kind;
+    spec.link_b = "body";
+    spec.at = PointAndAxis{{0, 0, 0}, {0, 1, 0}};
+    Simulation simulation(coupled(builder.build(), {spec}), {.step = 1e-3});
+    const double before = simulation.energy().total();
+    for (int k = 0; k < 1000; ++k) {
+      const StepReport report = simulation.step();
+      INFO(simulation.describe(report));
+      REQUIRE(report.ok());
+    }
+    CHECK(worst_gap(simulation.couplings()) < 1e-13);
+    CHECK(simulation.energy().total() == Approx(before).margin(1e-4));
+  }
+}
+
 TEST_CASE("A step that would open a coupling is refused by name") {
   // the rocker is led past where the crank can follow
   const Model model = four_bar(CouplingKind::hinge);
