@@ -174,6 +174,7 @@ CouplingPaths::CouplingPaths(const Model& model) {
     path.last_row = row += rows_of(coupling.kind).size();
     path.first_number = numbers_;
     numbers_ += path.rows() * path.velocities;
+    for (const GapRow& kind : rows_of(coupling.kind)) rigid_.push_back(compliance_of(coupling, kind).gives_way() ? 0 : 1);
     for (const CouplingPath::Joint& joint : path.reach) reached.insert(joint.slot);
   }
   if (!model.couplings.empty()) {

@@ -51,6 +51,8 @@ class CouplingPaths {
   bool empty() const { return paths_.empty(); }
   std::span<const CouplingPath> all() const { return paths_; }
   std::size_t rows() const { return empty() ? 0 : paths_.back().last_row; }
+  /// Whether a row of all of them does not give way.
+  bool is_rigid(std::size_t row) const { return rigid_[row] != 0; }
   /// What is kept for each row and velocity of its reach.
   std::size_t numbers() const { return numbers_; }
   /// Bodies in the reach of any coupling, and those from joints that are tied to each other up to the world; leaves first.
@@ -61,6 +63,7 @@ class CouplingPaths {
  private:
   std::vector<CouplingPath> paths_;
   std::vector<Index> reached_;
+  std::vector<char> rigid_;  // of each row
   std::vector<std::vector<Shared>> shared_;
   std::size_t numbers_ = 0;
 };

@@ -67,7 +67,6 @@ class CouplingSweeps {
         const GapKind kind = rows_of(path.coupling->kind)[row].kind;
         size_[path.first_row + row] = as<S>(kind == GapKind::product || kind == GapKind::sum ? 1.0 : path.length);
         const Compliance& compliance = compliance_of(*path.coupling, rows_of(path.coupling->kind)[row]);
-        rigid_.push_back(!compliance.gives_way());
         if (compliance.gives_way()) springs_.add(path.first_row + row, compliance, yields.empty() ? 0 : yields[path.first_row + row]);
       }
       for (const CouplingPath::Joint& joint : path.reach) slots_.push_back(joint.slot);
@@ -83,7 +82,7 @@ class CouplingSweeps {
   bool empty() const { return paths_.empty(); }
   /// Whether some row does.
   bool gives_way() const { return !springs_.empty(); }
-  bool is_rigid(std::size_t row) const { return rigid_[row]; }
+  bool is_rigid(std::size_t row) const { return paths_.is_rigid(row); }
 
   /// Bodies at q^k, where the tree's placements are; gears by their coordinates.
   void place(const Field<S, 12>& placement, const Field<S>& q) {
@@ -285,7 +284,7 @@ class CouplingSweeps {
   S openness() const {
     S sum(0.0);
     for (std::size_t j = 0; j < gap_.size(); ++j) {
-      if (rigid_[j]) sum = sum + (scale_[j] * gap_[j]) * (scale_[j] * gap_[j]);
+      if (is_rigid(j)) sum = sum + (scale_[j] * gap_[j]) * (scale_[j] * gap_[j]);
     }
     return sum;
   }
@@ -295,7 +294,7 @@ class CouplingSweeps {
     using std::abs, std::max;
     S widest(0.0);
     for (std::size_t j = 0; j < gap_.size(); ++j) {
-      if (rigid_[j]) widest = max(widest, abs(gap_[j]) / size_[j]);
+      if (is_rigid(j)) widest = max(widest, abs(gap_[j]) / size_[j]);
     }
     return widest;
   }
@@ -305,7 +304,7 @@ class CouplingSweeps {
   /// Times h^2; of the step solved last.
   S multiplier(std::size_t row) const { return springs_.whole(row, lambda_[row] + increment_[row]); }
   /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
-  auto is_held_already(std::size_t row) const { return rigid_[row] && solve_.inverse(row) == S(0.0); }
+  auto is_held_already(std::size_t row) const { return is_rigid(row) && solve_.inverse(row) == S(0.0); }
   const S& pivot(std::size_t row) const { return solve_.pivot(row); }
   const S& size(std::size_t row) const { return size_[row]; }
   /// How far a unit of impulse along a row opens it, with the factor made last and other rows left out.
@@ -516,7 +515,6 @@ class CouplingSweeps {
   std::vector<S> pulls_;                 // by the solve there is
   std::vector<S> moved_, tied_moved_;    // of each column, how its reach yields: scratch of a factor
   MaskedSolve<S> solve_, fresh_;
-  std::vector<bool> rigid_;              // of each row
   CouplingSprings<S> springs_;
   Field<S> ends_;                        // what springs push at the end of a step
   bool keeps_scales_ = false;
