@@ -192,6 +192,33 @@ TEST_CASE("What starts with a stretched spring, however stiff, begins at rest an
   CHECK(simulation.positions()[0] == Approx(0.1).epsilon(1e-3));
 }
 
+TEST_CASE("What rests on a stiff spring is not kicked where a step is cut in parts") {
+  // another body bounces on its limit, so that steps end where it does
+  TreeBuilder builder("resting");
+  builder.add(ball_of("body", 2, JointType::prismatic));
+  builder.add(ball_of("bouncing", 1, JointType::prismatic));
+  CouplingSpec spec{.name = "spring", .kind = CouplingKind::point_on_plane, .link_a = "", .link_b = "body", .shift = {5e5, 500}};
+  Effects effects;
+  JointLimit floor;
+  floor.row = 1;
+  floor.lower = -0.1;
+  floor.upper = 10;
+  floor.restitution = 1;
+  effects.limits.push_back(floor);
+  const Model model = coupled(builder.build(), {spec});
+  Simulation simulation(model, {.step = 1e-2}, effects);
+  simulation.set_positions(std::vector{-2 * 9.81 / 5e5, 0.5});
+  REQUIRE(simulation.run(20).ok());
+  int blows = 0;
+  for (int k = 0; k < 300; ++k) {
+    const StepReport report = simulation.step();
+    REQUIRE(report.ok());
+    blows += report.blows;
+    CHECK(std::abs(simulation.velocities()[0]) < 1e-8);
+  }
+  CHECK(blows >= 4);
+}
+
 TEST_CASE("A spring without a length pulls where both points meet") {
   TreeBuilder builder("anchored");
   builder.add(ball_of("body", 2, JointType::free));
