@@ -245,6 +245,15 @@ std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model)
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> list, std::string_view) {
     if (!list.empty()) lines.push_back({std::string(Entry::facts.name), where_of(list, model), what_of(list, effects, model)});
   });
+  std::vector<std::string> soft;
+  for (const Coupling& coupling : model.couplings) {
+    if (gives_way(coupling)) soft.push_back(kind_text(coupling));
+  }
+  if (soft.empty()) return lines;
+  const std::string number = counted(std::ssize(soft), "coupling");
+  std::ranges::sort(soft);
+  soft.erase(std::unique(soft.begin(), soft.end()), soft.end());
+  lines.push_back({"couplings", number, fmt::format("{}", fmt::join(soft, ", "))});
   return lines;
 }
 

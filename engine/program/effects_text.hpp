@@ -17,7 +17,7 @@ struct EffectLine {
   std::string what;   // "0.1 to 2 N m s/rad"
 };
 
-/// One line an effect that is there, gravity not among them.
+/// One line an effect that is there, gravity not among them, and one of all couplings that give way.
 std::vector<EffectLine> effect_lines(const Effects& effects, const Model& model);
 
 /// Every entry of every effect that is there, by the names of joints and bodies; infinities are null.
