@@ -87,7 +87,8 @@ double norm(const std::array<double, 3>& a) { return std::hypot(a[0], a[1], a[2]
 
 class PathMaker {
  public:
-  PathMaker(const Model& model, const Coupling& coupling) : model_(model), tree_(model.tree), coupling_(coupling) {}
+  PathMaker(const Model& model, const Coupling& coupling, bool at_world)
+      : model_(model), tree_(model.tree), coupling_(coupling), at_world_(at_world) {}
 
   CouplingPath make() {
     path_.coupling = &coupling_;
@@ -106,7 +107,7 @@ class PathMaker {
   }
 
  private:
-  /// Signs of the joints between the bodies; joints of a gear are where its terms are.
+  /// Signs of the joints between the bodies, and where it closes; joints of a gear are where its terms are.
   void mark_path() {
     const auto pass = [&](Index& slot, double sign) {
       signs_[slot] = sign;
@@ -114,8 +115,22 @@ class PathMaker {
       path_.length += std::hypot(placed(slot, 9), placed(slot, 10), placed(slot, 11));
       slot = tree_.parent(slot);
     };
-    for (Index a = coupling_.slot_a, b = coupling_.slot_b; a != b;) tree_.level(a) > tree_.level(b) ? pass(a, -1) : pass(b, 1);
-    for (const GearTerm& term : coupling_.terms) signs_[slot_of(term)] = 1;
+    Index a = coupling_.slot_a, b = coupling_.slot_b;
+    while (a != b) tree_.level(a) > tree_.level(b) ? pass(a, -1) : pass(b, 1);
+    path_.closes_at = a;
+    for (const GearTerm& term : coupling_.terms) {
+      const Index slot = slot_of(term);
+      signs_[slot] = 1;
+      path_.closes_at = &term == &coupling_.terms.front() ? tree_.parent(slot) : common_ancestor(path_.closes_at, tree_.parent(slot));
+    }
+    if (at_world_) path_.closes_at = 0;
+  }
+  Index common_ancestor(Index a, Index b) const {
+    while (a != b) {
+      Index& lower = tree_.level(a) > tree_.level(b) ? a : b;
+      lower = tree_.parent(lower);
+    }
+    return a;
   }
   Index slot_of(const GearTerm& term) const {
     Index slot = 1;
@@ -124,23 +139,24 @@ class PathMaker {
   }
   /// A parent's slot is smaller than its child's.
   void list() {
-    std::set<Index, std::greater<>> reach;
+    std::set<Index, std::greater<>> gone_through;
     for (const auto& [on_path, sign] : signs_) {
-      for (Index slot = on_path; slot != 0; slot = tree_.parent(slot)) reach.insert(slot);
+      for (Index slot = on_path; slot != path_.closes_at; slot = tree_.parent(slot)) gone_through.insert(slot);
     }
     Index at = 0;
     path_.on_path = 0;
-    for (const Index slot : reach) {
+    for (const Index slot : gone_through) {
       const auto found = signs_.find(slot);
-      path_.reach.push_back({slot, at, found == signs_.end() ? 0 : found->second});
+      path_.joints.push_back({slot, at, found == signs_.end() ? 0 : found->second});
       at += velocity_count(tree_.kind(slot));
       if (found != signs_.end()) path_.on_path = static_cast<std::size_t>(at);
     }
-    path_.velocities = static_cast<std::size_t>(at);
+    path_.velocities = path_.numbers = static_cast<std::size_t>(at);
+    path_.slots.assign(gone_through.begin(), gone_through.end());
   }
   void add_term(const GearTerm& term) {
     const Index slot = slot_of(term);
-    const auto at = std::ranges::find(path_.reach, slot, &CouplingPath::Joint::slot)->at;
+    const auto at = std::ranges::find(path_.joints, slot, &CouplingPath::Joint::slot)->at;
     path_.terms.push_back(static_cast<std::size_t>(at));
     const Eigen::Vector<double, 6> screw{0, 0, model_.constants.screw(slot, 0), 0, 0, model_.constants.screw(slot, 1)};
     path_.gear_yield += term.ratio * term.ratio / screw.dot(felt_inertia(model_, slot) * screw);
@@ -149,47 +165,144 @@ class PathMaker {
   const Model& model_;
   const Tree& tree_;
   const Coupling& coupling_;
+  bool at_world_;
   CouplingPath path_{};
   std::map<Index, double> signs_;
 };
 
-std::vector<CouplingPaths::Shared> shared_of(const CouplingPath& first, const CouplingPath& second) {
-  std::vector<CouplingPaths::Shared> shared;
-  auto other = second.reach.begin();
-  for (const CouplingPath::Joint& joint : first.reach) {
-    while (other != second.reach.end() && other->slot > joint.slot) ++other;
-    if (other != second.reach.end() && other->slot == joint.slot) shared.push_back({joint.slot, joint.at, other->at});
+/// What the paths of two couplings share; next to each other in both: one piece.
+std::vector<CouplingPath::Shared> shared_of(const Model& model, std::span<const Closure> closures, const CouplingPath& first, const CouplingPath& second) {
+  std::vector<CouplingPath::Shared> shared;
+  const auto add = [&](std::size_t at_first, std::size_t at_second, std::size_t count) {
+    if (!shared.empty()) {
+      CouplingPath::Shared& last = shared.back();
+      if (last.at_first + last.count == at_first && last.at_second + last.count == at_second) {
+        last.count += count;
+        return;
+      }
+    }
+    shared.push_back({at_first, at_second, count});
+  };
+  auto other = second.joints.begin();
+  for (const CouplingPath::Joint& joint : first.joints) {
+    while (other != second.joints.end() && other->slot > joint.slot) ++other;
+    if (other == second.joints.end() || other->slot != joint.slot) continue;
+    add(static_cast<std::size_t>(joint.at), static_cast<std::size_t>(other->at), static_cast<std::size_t>(velocity_count(model.tree.kind(joint.slot))));
+  }
+  for (const CouplingPath::Passed& one : first.passed) {
+    const auto found = std::ranges::find(second.passed, one.closure, &CouplingPath::Passed::closure);
+    if (found != second.passed.end()) add(one.at, found->at, closures[one.closure].rows.size());
   }
   return shared;
 }
 
+/// Couplings, by number, of which those with a joint in common are one set.
+class Sets {
+ public:
+  explicit Sets(std::size_t count) : leader_(count) {
+    for (std::size_t k = 0; k < count; ++k) leader_[k] = k;
+  }
+  std::size_t leader(std::size_t k) {
+    while (leader_[k] != k) k = leader_[k] = leader_[leader_[k]];
+    return k;
+  }
+  void join(std::size_t a, std::size_t b) {
+    a = leader(a);
+    b = leader(b);
+    leader_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::size_t> leader_;
+};
+
 }  // namespace
 
-CouplingPaths::CouplingPaths(const Model& model) {
+CouplingPaths::CouplingPaths(const Model& model, Closing closing) {
+  const bool at_world = closing == Closing::at_world || !model.mimics.empty();
   std::set<Index, std::greater<>> reached;
+  const auto reach = [&](Index slot) {
+    for (; slot != 0 && reached.insert(slot).second; slot = model.tree.parent(slot)) {
+    }
+  };
   std::size_t row = 0;
   for (const Coupling& coupling : model.couplings) {
-    CouplingPath& path = paths_.emplace_back(PathMaker(model, coupling).make());
+    CouplingPath& path = paths_.emplace_back(PathMaker(model, coupling, at_world).make());
     path.first_row = row;
     path.last_row = row += rows_of(coupling.kind).size();
-    path.first_number = numbers_;
-    numbers_ += path.rows() * path.velocities;
+    path.first_velocity = velocities_;
+    velocities_ += path.rows() * path.velocities;
     for (const GapRow& kind : rows_of(coupling.kind)) rigid_.push_back(compliance_of(coupling, kind).gives_way() ? 0 : 1);
-    for (const CouplingPath::Joint& joint : path.reach) reached.insert(joint.slot);
+    for (const CouplingPath::Joint& joint : path.joints) reach(joint.slot);
   }
   if (!model.couplings.empty()) {
     for (const Mimic& mimic : model.mimics) {
-      for (const Index tied : {mimic.leader_slot, mimic.follower_slot}) {
-        for (Index slot = tied; slot != 0; slot = model.tree.parent(slot)) reached.insert(slot);
-      }
+      reach(mimic.leader_slot);
+      reach(mimic.follower_slot);
     }
   }
   reached_.assign(reached.begin(), reached.end());
-  for (const CouplingPath& first : paths_) {
-    for (const CouplingPath& second : paths_) shared_.push_back(shared_of(first, second));
+  close(model);
+}
+
+/// Closures, and what each path passes and meets.
+void CouplingPaths::close(const Model& model) {
+  // those that close at one body and go through one joint close together; all, where joints that are tied to each other reach everywhere
+  Sets sets(paths_.size());
+  std::map<std::pair<Index, Index>, std::size_t> first_through;  // (body, joint) -> number
+  for (std::size_t k = 0; k < paths_.size(); ++k) {
+    for (const CouplingPath::Joint& joint : paths_[k].joints) sets.join(k, first_through.try_emplace({paths_[k].closes_at, joint.slot}, k).first->second);
+    if (!model.mimics.empty()) sets.join(k, 0);
+  }
+  std::vector<std::size_t> leaders;
+  for (std::size_t k = 0; k < paths_.size(); ++k) {
+    if (sets.leader(k) == k) leaders.push_back(k);
+  }
+  std::ranges::stable_sort(leaders, std::ranges::greater(), [&](std::size_t k) { return paths_[k].closes_at; });
+  std::vector<std::size_t> number_of(paths_.size());  // of the closure that a leader's set is
+  for (const std::size_t leader : leaders) {
+    number_of[leader] = closures_.size();
+    closures_.push_back({paths_[leader].closes_at, {}, {}});
+  }
+  std::map<Index, std::vector<std::size_t>> closures_through;  // joint -> closures with a path through it
+  for (std::size_t k = 0; k < paths_.size(); ++k) {
+    const std::size_t number = number_of[sets.leader(k)];
+    paths_[k].closure = number;
+    paths_[k].first_in_closure = closures_[number].rows.size();
+    closures_[number].paths.push_back(k);
+    for (std::size_t row = paths_[k].first_row; row < paths_[k].last_row; ++row) closures_[number].rows.push_back(row);
+    for (const CouplingPath::Joint& joint : paths_[k].joints) {
+      std::vector<std::size_t>& through = closures_through[joint.slot];
+      if (std::ranges::find(through, number) == through.end()) through.push_back(number);
+    }
+  }
+  for (std::size_t k = 0; k < paths_.size(); ++k) {
+    CouplingPath& path = paths_[k];
+    std::set<std::size_t> passed;
+    for (const CouplingPath::Joint& joint : path.joints) {
+      for (const std::size_t number : closures_through[joint.slot]) {
+        if (closures_[number].slot > path.closes_at) passed.insert(number);
+      }
+    }
+    for (const std::size_t number : passed) {
+      path.passed.push_back({number, path.numbers});
+      path.numbers += closures_[number].rows.size();
+    }
+    path.first_number = numbers_;
+    numbers_ += path.rows() * path.numbers;
+  }
+  for (std::size_t k = 0; k < paths_.size(); ++k) {
+    CouplingPath& path = paths_[k];
+    const auto meet = [&](const Closure& closure) {
+      for (const std::size_t other : closure.paths) path.meetings.push_back({other, shared_of(model, closures_, path, paths_[other])});
+    };
+    meet(closures_[path.closure]);
+    for (const CouplingPath::Passed& one : path.passed) meet(closures_[one.closure]);
   }
 }
 
 CouplingPaths::~CouplingPaths() = default;
+
+const CouplingPath& CouplingPaths::path_of(std::size_t row) const { return *std::ranges::upper_bound(paths_, row, {}, &CouplingPath::last_row); }
 
 }  // namespace linden

@@ -1,11 +1,16 @@
-// Which joints a model's couplings are felt at: made once, of the tree alone.
+// Where a model's couplings are felt and where they close: made once, of the tree alone.
 //
-// A coupling pushes its two bodies; what the joints on the way between them, up to the body that both hang on, see of that is its *path*. What
-// is left of it when those joints have yielded goes on from there to the world: the *reach* of a coupling is its path and all joints above it,
-// leaves first. Two couplings feel each other where their reaches meet.
+// A coupling pushes its two bodies; what the joints on the way between them, up to the nearest body that both hang on, see of that is its
+// *path*. There it closes: what its path has yielded is all that body needs to know of it, and nothing above feels a loop that is closed
+// below but as inertia. Loops that close at one body and share joints close together, as one *closure*. A path may lead past closures of
+// others: there its impulses make those yield once more, as they do joints.
+//
+// Where joints are tied to each other (kernels/tree/mimic.hpp) a tree is solved with tied rows held, which belong to the whole of it. There all
+// couplings close at the world, and a path goes on up to it.
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -14,19 +19,42 @@
 namespace linden {
 
 struct CouplingPath {
-  /// A joint of the reach, where its velocities are among the reach's, and how it moves b against a: 1 on the way to b, -1 on the way to a,
-  /// 0 above both.
+  /// A joint that is gone through, where its velocities are among the path's, and how it moves b against a: 1 on the way to b, -1 on the way
+  /// to a, 0 above both.
   struct Joint {
     Index slot;
     Index at;
     double sign;
   };
+  /// A closure that is gone past, and where its rows are among the path's numbers.
+  struct Passed {
+    std::size_t closure;
+    std::size_t at;
+  };
+  /// Numbers next to each other that are of the same joints or closures in the paths of two couplings.
+  struct Shared {
+    std::size_t at_first, at_second, count;
+  };
+  /// The other coupling, and what both paths share.
+  struct Meeting {
+    std::size_t path;
+    std::vector<Shared> shared;
+  };
+
   const Coupling* coupling;
   std::size_t first_row, last_row;    // of all rows of all couplings
-  std::size_t first_number;           // of what is kept for each row and velocity of the reach
-  std::vector<Joint> reach;           // leaves first; those of the path come first
-  std::size_t velocities, on_path;    // of the reach; of the path
-  std::vector<std::size_t> terms;     // of a gear: where the velocity of each term is among the reach's
+  std::size_t first_velocity;         // of what is kept for each row and velocity
+  std::size_t first_number;           // of what is kept for each row and number
+  std::vector<Joint> joints;          // leaves first; those that move b against a come first
+  std::vector<Index> slots;           // of the joints
+  std::vector<Passed> passed;         // in the order of a way up
+  std::size_t velocities, on_path;    // of all joints; of those up to the last that moves b against a
+  std::size_t numbers;                // velocities, and rows of closures that are passed
+  std::vector<Meeting> meetings;      // with those of its closure, itself too, in their order; then with those of each closure that is passed
+  std::vector<std::size_t> terms;     // of a gear: where the velocity of each term is
+  Index closes_at;                    // body, 0: the world
+  std::size_t closure;                // number of the one it closes in
+  std::size_t first_in_closure;       // its first row, among that one's
   double length;                      // [m] of the way from frame to frame, by which a gap is judged
   std::array<double, 36> yield_a, yield_b;  // how the bodies would move were they free: wrench -> twist
   double gear_yield;                  // likewise, of a gear
@@ -34,15 +62,22 @@ struct CouplingPath {
   std::size_t rows() const { return last_row - first_row; }
 };
 
+/// Couplings that close together.
+struct Closure {
+  Index slot;                      // of the body, 0: the world
+  std::vector<std::size_t> paths;
+  std::vector<std::size_t> rows;   // of all rows, path by path
+};
+
+/// Where couplings close.
+enum class Closing : std::uint8_t {
+  nearest,   // at the nearest body that theirs hang on; at the world where joints are tied to each other
+  at_world,  // to be compared with
+};
+
 class CouplingPaths {
  public:
-  /// A joint in the reach of two couplings, and where its velocities are in the one and the other.
-  struct Shared {
-    Index slot;
-    Index at_first, at_second;
-  };
-
-  explicit CouplingPaths(const Model& model);
+  CouplingPaths(const Model& model, Closing closing);
   // not inline: those that use it are compiled for one processor each
   ~CouplingPaths();
   CouplingPaths(const CouplingPaths&) = delete;
@@ -50,22 +85,27 @@ class CouplingPaths {
 
   bool empty() const { return paths_.empty(); }
   std::span<const CouplingPath> all() const { return paths_; }
+  /// Leaves first: each after those that its paths pass.
+  std::span<const Closure> closures() const { return closures_; }
   std::size_t rows() const { return empty() ? 0 : paths_.back().last_row; }
+  /// That a row of all of them belongs to.
+  const CouplingPath& path_of(std::size_t row) const;
   /// Whether a row of all of them does not give way.
   bool is_rigid(std::size_t row) const { return rigid_[row] != 0; }
-  /// What is kept for each row and velocity of its reach.
+  /// What is kept for each row and velocity of its path; for each row and number.
+  std::size_t velocities() const { return velocities_; }
   std::size_t numbers() const { return numbers_; }
-  /// Bodies in the reach of any coupling, and those from joints that are tied to each other up to the world; leaves first.
+  /// Bodies on the way of any coupling to the world, and those from joints that are tied to each other; leaves first.
   std::span<const Index> reached() const { return reached_; }
-  /// Of couplings number `first` and `second`.
-  std::span<const Shared> shared(std::size_t first, std::size_t second) const { return shared_[first * paths_.size() + second]; }
 
  private:
+  void close(const Model& model);
+
   std::vector<CouplingPath> paths_;
+  std::vector<Closure> closures_;
   std::vector<Index> reached_;
   std::vector<char> rigid_;  // of each row
-  std::vector<std::vector<Shared>> shared_;
-  std::size_t numbers_ = 0;
+  std::size_t velocities_ = 0, numbers_ = 0;
 };
 
 }  // namespace linden

@@ -24,7 +24,7 @@ enum class Coupled : std::uint8_t { step, velocities, reading, positions };
 template <class S>
 class CouplingSprings {
  public:
-  /// yields: how far the row opens by a unit of impulse (coupling_yields.hpp).
+  /// Row by row. yields: how far the row opens by a unit of impulse (coupling_yields.hpp).
   void add(std::size_t row, const Compliance& compliance, double yields) { springs_.push_back({row, compliance, yields}); }
   bool empty() const { return springs_.empty(); }
 
@@ -35,15 +35,12 @@ class CouplingSprings {
     for (Spring& spring : springs_) spring.law = row_law(spring.compliance, h, spring.yields);
   }
 
-  /// visit(row, yield): what a row yields beside its bodies, where this is solved for; infinite: it pushes nothing.
-  template <class Visit>
-  void each_yield(Coupled of, const Visit& visit) const {
-    for (const Spring& spring : springs_) {
-      const double yield = of == Coupled::step      ? spring.law.yield
-                           : of == Coupled::reading ? 1 / (spring.excess * spring.compliance.damping)
-                                                    : std::numeric_limits<double>::infinity();
-      visit(spring.row, as<S>(yield));
-    }
+  /// What a row yields beside its bodies, where this is solved for; infinite: it pushes nothing.
+  double yield(Coupled of, std::size_t row) const {
+    const Spring& spring = spring_of(row);
+    return of == Coupled::step      ? spring.law.yield
+           : of == Coupled::reading ? 1 / (spring.excess * spring.compliance.damping)
+                                    : std::numeric_limits<double>::infinity();
   }
   /// Of a step: -gaps become what is left of the laws, with multipliers lambda.
   void complete(const std::vector<S>& lambda, std::vector<S>& right_side) const {
@@ -53,12 +50,7 @@ class CouplingSprings {
     }
   }
   /// Whole multiplier of a row, from the share of it that acts at the beginning.
-  S whole(std::size_t row, const S& multiplier) const {
-    for (const Spring& spring : springs_) {
-      if (spring.row == row) return multiplier / as<S>(spring.law.share);
-    }
-    return multiplier;
-  }
+  S whole(std::size_t row, const S& multiplier) const { return multiplier / as<S>(spring_of(row).law.share); }
 
   /// What rows push at the end of a step of h, where gaps are these; returns what they took [J].
   S end(double h, const std::vector<S>& gaps, std::vector<S>& push) const {
@@ -98,7 +90,9 @@ class CouplingSprings {
     double excess = 0;  // (s - 1/2) h, for readings
     S begin{};          // its gap at q^k
   };
-  std::vector<Spring> springs_;
+  const Spring& spring_of(std::size_t row) const { return *std::ranges::lower_bound(springs_, row, {}, &Spring::row); }
+
+  std::vector<Spring> springs_;  // by row
 };
 
 }  // namespace linden

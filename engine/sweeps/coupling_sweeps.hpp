@@ -7,13 +7,18 @@
 // That is RATTLE's map: order 2, symplectic, the same there and back, and what a tree keeps of momentum it keeps. p and p + G^T kappa take the
 // same step, since lambda takes up the difference; what is stored is the one without. Gaps are closed by position, so nothing drifts.
 //
-//   place             q^k: where bodies are, G on the paths
-//   find_gaps         q^k+1 of a displacement: gaps, J on the paths
-//   factor            S = J A^-1 G^T by two sweeps over the reach of each row (kernels/couplings/impulse_along_up.hpp), and its factor
-//                     (masked_solve.hpp)
-//   give_way          after the first half of the tree's solve, with u left of r: S dlambda = J A^-1 r - g, and u of r - G^T dlambda
-//   take_multipliers  the target of the residual gets G^T dlambda, before the next evaluation
-//   end               what rows that give way push at the end of the step (kernels/couplings/compliance.hpp)
+// Rows are unknowns of the tree's own elimination: once the joints of a loop have been taken out, its rows are, and what is left for the body
+// where it closes is inertia. With A of the joints below that body, eta how that body moves, b and y what columns of G^T and rows of J have
+// become there (kernels/couplings/impulse_along_up.hpp):
+//
+//   S = J A^-1 G^T,   S dlambda = J A^-1 r - g - y^T eta,   A_body += b S^-1 y^T                    (masked_solve.hpp)
+//
+//   factor   the tree's sweep between bodies where couplings close (up_to_closures), and close() there
+//   solve    up: the tree's sweep, and yield(): rho = S^-1 (J A^-1 r - g), the body gets b rho less
+//            down: push(): dlambda = rho - S^-1 y^T eta, joints below get u of r - G^T dlambda, then the tree's sweep to the next (down_from_closures)
+//
+// A loop costs what its path does, wherever it hangs: a ladder of a thousand cells, each closing at the one above, is solved in O(n). What closes
+// at the world is solved by one dense matrix, over the paths.
 //
 // Multipliers are carried times h, like all impulses of a step, and begin at zero: the residual is linear in them, so what they begin with
 // changes no correction, and a correction that is cut short needs none of them back. What has not been taken yet is found anew, to the bit, by
@@ -23,7 +28,7 @@
 // unknowns, whose share of S is (J X) T^-1 Z^T (1 - A A_held^-1) G^T. What a coordinate feels of impulses, Z^T (r - A A_held^-1 r), is kHold times
 // the motion of its rows; so it is a row like others.
 //
-// cost    a row's reach twice a factor, all reaches once an evaluation; products of rows where reaches meet
+// cost    a factor: two sweeps over the path of each row, products of rows where paths meet; a solve: numbers of all paths, twice
 // source  Andersen 1983 (RATTLE); Featherstone, Rigid Body Dynamics Algorithms, ch. 8 (loop joints), 8.5 (loops within a tree's solve)
 #pragma once
 
@@ -33,10 +38,9 @@
 #include <utility>
 #include <vector>
 
-#include "engine/sweeps/coupling_paths.hpp"
+#include "engine/sweeps/coupling_rows.hpp"
 #include "engine/sweeps/coupling_springs.hpp"
 #include "kernels/block/evaluate_down.hpp"
-#include "kernels/couplings/gap_map.hpp"
 #include "kernels/couplings/impulse_along_up.hpp"
 #include "kernels/couplings/masked_solve.hpp"
 #include "kernels/tree/mimic.hpp"
@@ -51,190 +55,182 @@ class CouplingSweeps {
   using Mask = typename LanesOf<S>::Mask;
 
   /// yields: of each row (coupling_yields.hpp); empty where none gives way.
-  CouplingSweeps(const Model& model, std::span<const double> yields) : model_(model), paths_(model) {
+  CouplingSweeps(const Model& model, std::span<const double> yields, Closing closing = Closing::nearest) : model_(model), rows_(model, closing) {
     if (empty()) return;
     const Shape& shape = model.tree.shape;
-    pose_.allocate(shape.slots);
     bias_.allocate(shape.slots);
-    left_.allocate(shape.velocities, S(0.0));
-    const std::size_t rows = paths_.rows();
-    solve_ = fresh_ = MaskedSolve<S>(rows);
-    for (std::vector<S>* each : {&gap_, &size_, &scale_, &lambda_, &increment_, &pull_, &moved_by_itself_}) each->assign(rows, S(0.0));
-    for (std::vector<S>* each : {&begin_, &end_, &across_, &moved_}) each->assign(paths_.numbers(), S(0.0));
-    for (const CouplingPath& path : paths_.all()) {
-      for (const auto& term : path.coupling->terms) at_start_.push_back(as<S>(term.ratio));
+    for (std::vector<S>* each : {&lambda_, &increment_, &pull_, &rho_}) each->assign(rows(), S(0.0));
+    for (std::vector<S>* each : {&across_, &columns_}) each->assign(paths().numbers(), S(0.0));
+    for (const Closure& closure : closures()) factors_.emplace_back(closure.rows.size());
+    for (const CouplingPath& path : paths().all()) {
       for (std::size_t row = 0; row < path.rows(); ++row) {
-        const GapKind kind = rows_of(path.coupling->kind)[row].kind;
-        size_[path.first_row + row] = as<S>(kind == GapKind::product || kind == GapKind::sum ? 1.0 : path.length);
         const Compliance& compliance = compliance_of(*path.coupling, rows_of(path.coupling->kind)[row]);
         if (compliance.gives_way()) springs_.add(path.first_row + row, compliance, yields.empty() ? 0 : yields[path.first_row + row]);
       }
-      for (const CouplingPath::Joint& joint : path.reach) slots_.push_back(joint.slot);
     }
     const std::size_t coordinates = MimicTies<S>(model.mimics, model.tree).coordinates();
-    for (std::vector<S>* each : {&tied_across_, &tied_moved_}) each->assign(rows * coordinates, S(0.0));
+    for (std::vector<S>* each : {&tied_across_, &tied_columns_}) each->assign(rows() * coordinates, S(0.0));
     felt_.resize(coordinates);
-    for (Field<S>& row : felt_) row.allocate(shape.velocities, S(0.0));
+    for (Field<S>& row : felt_) row.allocate(shape.velocities);
     pulls_.assign(coordinates, S(0.0));
+    if (coordinates > 0) tied_.allocate(shape.velocities, S(0.0));
     if (gives_way()) ends_.allocate(shape.velocities, S(0.0));
   }
 
-  bool empty() const { return paths_.empty(); }
+  bool empty() const { return rows_.empty(); }
   /// Whether some row does.
   bool gives_way() const { return !springs_.empty(); }
-  bool is_rigid(std::size_t row) const { return paths_.is_rigid(row); }
 
   /// Bodies at q^k, where the tree's placements are; gears by their coordinates.
   void place(const Field<S, 12>& placement, const Field<S>& q) {
     if (empty()) return;
-    const S zero(0.0), one(1.0);
-    store(pose_, 0, Placement<S>{{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}}, {zero, zero, zero}});
-    for (auto slot = paths_.reached().rbegin(); slot != paths_.reached().rend(); ++slot) {
-      store(pose_, *slot, placed_in(load<Placement, S>(pose_, model_.tree.parent(*slot)), load<Placement, S>(placement, *slot)));
-    }
-    for (std::size_t term = 0; const CouplingPath& path : paths_.all()) {
-      for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
-    }
-    look([&](Index slot) { return load<Placement, S>(pose_, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
-    springs_.place(gap_);
+    rows_.place(placement, q);
+    springs_.place(rows_.gaps());
   }
-  /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
-  void keep_scales(bool keep) { keeps_scales_ = keep; }
-
+  void keep_scales(bool keep) { rows_.keep_scales(keep); }
   /// Before the first evaluation of a step of h.
   void begin(double h) {
     std::ranges::fill(lambda_, S(0.0));
     std::ranges::fill(increment_, S(0.0));
     springs_.begin(h);
   }
-
   /// Gaps at the end of a displacement, and how joints change them there.
   void find_gaps(const Field<S, 7>& displacement, const Field<S>& delta) {
-    if (empty()) return;
-    look([&](Index slot) { return moved_by(load<Placement, S>(pose_, slot), load<Displacement, S>(displacement, slot)); },
-         [&](Index row) { return delta(row); }, end_, false);
+    if (!empty()) rows_.find_gaps(displacement, delta);
   }
 
-  /// With the gains of a tree that was just factored, and its ties. motion: with which increments are found, null for rates. damping: added
-  /// to the scaled diagonal. In these lanes the factor is the one to solve with from now on.
+  /// sweep(slots) of all bodies, leaves to root, in parts: at(closure) once all bodies beyond that where it closes have been met, and it has
+  /// not.
+  template <class Sweep, class At>
+  void up_to_closures(const Sweep& sweep, const At& at) const {
+    Slots left = all_slots(model_.tree);
+    for (std::size_t k = 0; k < closures().size(); ++k) {
+      const Index beyond = closures()[k].slot + 1;
+      if (beyond < left.end) sweep(left.part(beyond, left.end));
+      left.end = std::min(left.end, beyond);
+      at(k);
+    }
+    if (left.begin < left.end) sweep(left);
+  }
+  /// The same, root to leaves: at(closure) once the body where it closes has been met, and none beyond has.
+  template <class Sweep, class At>
+  void down_from_closures(const Sweep& sweep, const At& at) const {
+    Slots left = all_slots(model_.tree);
+    for (std::size_t k = closures().size(); k-- > 0;) {
+      const Index beyond = closures()[k].slot + 1;
+      if (left.begin < beyond) sweep(left.part(left.begin, beyond));
+      left.begin = std::max(left.begin, beyond);
+      at(k);
+    }
+    if (left.begin < left.end) sweep(left);
+  }
+  /// Body where it closes, 0: the world.
+  Index slot_of(std::size_t closure) const { return closures()[closure].slot; }
+
+  /// Within up_to_closures of a factor, whose gains and ties are those of the bodies beyond. motion: with which increments are found, null for
+  /// rates. damping: added to the scaled diagonal. In these lanes the factor is the one to solve with from now on. Returns what the body
+  /// where it closes feels of it, as Mat6 has it; for the world there is nothing.
   template <class Element>
-  void factor(Coupled of, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Field<S, 7>* motion,
-              const Gains<S>& gains, MimicTies<S>& ties, const Mask& lanes, double damping = 0) {
-    if (empty()) return;
-    const std::vector<S>& jacobian = of == Coupled::step ? end_ : begin_;
+  std::array<S, 36> close(std::size_t closure, Coupled of, const BodyConstants<Element>& constants, const Field<S, 12>& placement,
+                          const Field<S, 7>* motion, const Gains<S>& gains, MimicTies<S>& ties, const Mask& lanes, double damping = 0) {
     const auto here = [&](auto, Index i) { return load<Placement, S>(placement, i); };
     const auto at_end = [&](auto joint, Index i) { return after_motion(joint, load<Placement, S>(placement, i), load_motion(joint, *motion, i)); };
-    motion != nullptr ? feel(constants, at_end, gains, ties, lanes) : feel(constants, here, gains, ties, lanes);
-    std::size_t first_slot = 0;
-    for (const CouplingPath& path : paths_.all()) {
-      const std::span<const Index> slots(&slots_[first_slot], path.reach.size());
-      first_slot += slots.size();
-      for (std::size_t row = path.first_row; row < path.last_row; ++row) {
-        const std::size_t first = path.first_number + (row - path.first_row) * path.velocities;
-        if (!ties.empty()) clear_left();
-        impulse_along_up(
-            model_.tree, constants, here, gains.up, slots, numbers_of(path, &begin_[first]),
-            [&](auto joint, std::size_t k, const Wrench<S>&, const Wrench<S>& u) {
-              const Wrench<S> moved = apply_inverse(joint, gains.inverse, model_.tree.first_block(slots[k]), u);
-              store_joint(joint, left_, model_.tree.first_v(slots[k]), moved);
-              put(joint, moved, &moved_[first + at(path, k)]);
-            },
-            bias_);
-        std::ranges::copy(moved_ties(ties), tied_moved_.begin() + static_cast<std::ptrdiff_t>(row * ties.coordinates()));
-        const auto keep = [&](auto joint, std::size_t k, const Wrench<S>&, const Wrench<S>& y) {
-          S now[6];
-          put(joint, y, now);
-          S* const kept = &across_[first + at(path, k)];
-          for (Index c = 0; c < velocity_count(joint); ++c) kept[c] = select(lanes, now[c], kept[c]);
-        };
-        const auto row_up = [&](const auto& placement_of) {
-          impulse_along_up(model_.tree, constants, placement_of, gains.down, slots, numbers_of(path, &jacobian[first]), keep, bias_);
-        };
-        motion != nullptr ? row_up(at_end) : row_up(here);
-        for (std::size_t c = 0; c < ties.coordinates(); ++c) {
-          S sum(0.0);
-          each_on_path(path, [&](Index v, std::size_t at_row) { sum = sum + jacobian[first + at_row] * ties.response(c)(v); });
-          S& kept = tied_across_[row * ties.coordinates() + c];
-          kept = select(lanes, sum, kept);
-        }
+    const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
+    const auto rows_up = [&](const auto& arrives) {
+      if (closure == 0) feel(constants, arrives, gains, ties, lanes);
+      for (const std::size_t k : closures()[closure].paths) {
+        const CouplingPath& path = paths().all()[k];
+        for (std::size_t j = 0; j < path.rows(); ++j) row_up(path, j, jacobian, constants, arrives, gains, ties, lanes);
       }
+    };
+    for (const std::size_t k : closures()[closure].paths) {
+      const CouplingPath& path = paths().all()[k];
+      for (std::size_t j = 0; j < path.rows(); ++j) column_up(path, j, constants, here, gains, ties, lanes);
     }
-    multiply(ties.coordinates());
-    for (std::size_t j = 0; j < gap_.size(); ++j) {
-      moved_by_itself_[j] = select(lanes, fresh_.at(j, j), moved_by_itself_[j]);
-      fresh_.at(j, j) = fresh_.at(j, j) + as<S>(damping);
-    }
-    springs_.each_yield(of, [&](std::size_t j, const S& yield) { fresh_.at(j, j) = fresh_.at(j, j) + scale_[j] * scale_[j] * yield; });
-    fresh_.factor();
-    solve_.take(fresh_, lanes);
+    motion != nullptr ? rows_up(at_end) : rows_up(here);
+    factor(closure, of, ties.coordinates(), lanes, damping);
+    return felt_above(closure);
   }
 
-  /// Between the halves of a solve: innovation, u of r, becomes that of r - G^T dlambda; `with` what was passed up to each body, h F less the
-  /// bias, if it is asked for. The gains are those of the factor. given: velocities that are there beside those that are solved for; null: none.
-  template <class Element>
-  void give_way(Coupled of, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains, MimicTies<S>& ties,
-                Field<S>& innovation, Field<S, 6>* with, const Field<S>* given = nullptr) {
+  /// Before the first half of a solve. given: velocities that are there beside those that are solved for; null: none.
+  void begin_solve(Coupled of, const Field<S>* given = nullptr) {
     if (empty()) return;
-    for (const Index i : paths_.reached()) {
-      with_joint(model_.tree.kind(i), [&](auto joint) {
-        const Index row = model_.tree.first_v(i);
-        store_joint(joint, left_, row, apply_inverse(joint, gains.inverse, model_.tree.first_block(i), load_joint(joint, innovation, row)));
-      });
-    }
-    const std::vector<S>& tied = moved_ties(ties);
-    std::vector<S>& pull = of == Coupled::step ? increment_ : pull_;
-    for (const CouplingPath& path : paths_.all()) {
+    for (const CouplingPath& path : paths().all()) {
       for (std::size_t row = path.first_row; row < path.last_row; ++row) {
-        S sum = of == Coupled::velocities || of == Coupled::reading ? S(0.0) : S(0.0) - gap_[row];
-        const S* y = &across_[path.first_number + (row - path.first_row) * path.velocities];
-        for (const CouplingPath::Joint& joint : path.reach) {
-          const Index first = model_.tree.first_v(joint.slot);
-          for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) sum = sum + *y++ * left_(first + k);
-        }
-        for (std::size_t c = 0; c < tied.size(); ++c) sum = sum + tied_across_[row * tied.size() + c] * tied[c];
-        if (given != nullptr) {
-          sum = sum + opening_of(path, row, *given);
-        }
-        pull[row] = sum;
+        rho_[row] = of == Coupled::velocities || of == Coupled::reading ? S(0.0) : S(0.0) - rows_.gaps()[row];
+        if (given != nullptr) rho_[row] = rho_[row] + rows_.opening_of(path, row, *given);
       }
     }
-    if (of == Coupled::step) springs_.complete(lambda_, pull);
-    for (std::size_t j = 0; j < gap_.size(); ++j) pull[j] = scale_[j] * pull[j];
-    solve_.solve(pull);
-    for (std::size_t j = 0; j < gap_.size(); ++j) pull[j] = scale_[j] * pull[j];
-    clear_left();
-    push(pull, begin_, left_, minus);
-    impulse_along_up(
-        model_.tree, constants, [&](auto, Index i) { return load<Placement, S>(placement, i); }, gains.up, paths_.reached(),
-        [&](auto joint, std::size_t k) { return load_joint(joint, left_, model_.tree.first_v(paths_.reached()[k])); },
-        [&](auto joint, std::size_t k, const Wrench<S>& b, const Wrench<S>& u) {
-          const Index i = paths_.reached()[k], row = model_.tree.first_v(i);
-          store_joint(joint, innovation, row, load_joint(joint, innovation, row) + u);
-          if (with != nullptr) store(*with, i, load<Wrench, S>(*with, i) - b);
-        },
-        bias_);
+    if (of == Coupled::step) springs_.complete(lambda_, rho_);
   }
+  /// Within up_to_closures of the first half of a solve, whose innovation, u of r, is that of the bodies beyond: of the bias, what was passed up
+  /// to bodies, that of the body where it closes.
+  void yield(std::size_t closure, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
+    const Closure& closes = closures()[closure];
+    ClosureFactor& kept = factors_[closure];
+    if (closure == 0) moved_ties(ties, paths().reached(), [&](Index v, Index) { return innovation(v); });
+    std::size_t at = 0;
+    for (const std::size_t k : closes.paths) {
+      const CouplingPath& path = paths().all()[k];
+      for (std::size_t j = 0; j < path.rows(); ++j, ++at) {
+        const S* const numbers = &across_[path.first_number + j * path.numbers];
+        S sum = rho_[path.first_row + j];
+        each_velocity(path, [&](Index v, std::size_t n) { sum = sum + numbers[n] * innovation(v); });
+        for (const CouplingPath::Passed& passed : path.passed) {
+          const std::vector<std::size_t>& rows = closures()[passed.closure].rows;
+          for (std::size_t i = 0; i < rows.size(); ++i) sum = sum + numbers[passed.at + i] * rho_[rows[i]];
+        }
+        for (std::size_t c = 0; c < pulls_.size(); ++c) sum = sum + tied_across_[(path.first_row + j) * pulls_.size() + c] * (*tied_moved_)[c];
+        kept.right_side[at] = sum;
+      }
+    }
+    solve(closure);
+    for (at = 0; at < closes.rows.size(); ++at) rho_[closes.rows[at]] = kept.right_side[at];
+    if (closes.slot != 0) store(bias, closes.slot, load<Wrench, S>(bias, closes.slot) - passed_up(closure));
+  }
+  /// Within down_from_closures of the second half of a solve, where it is known how the body where it closes moves: the innovation of joints
+  /// beyond becomes that of r - G^T dlambda.
+  void push(std::size_t closure, Coupled of, const Field<S, 6>& variation, Field<S>& innovation) {
+    const Closure& closes = closures()[closure];
+    const ClosureFactor& kept = factors_[closure];
+    std::vector<S>& multipliers = of == Coupled::step ? increment_ : pull_;
+    std::size_t at = 0;
+    for (const std::size_t k : closes.paths) {
+      const CouplingPath& path = paths().all()[k];
+      for (std::size_t j = 0; j < path.rows(); ++j, ++at) {
+        S& multiplier = multipliers[path.first_row + j] = rho_[path.first_row + j];
+        for (int c = 0; closes.slot != 0 && c < 6; ++c) multiplier = multiplier - kept.down[6 * at + static_cast<std::size_t>(c)] * variation(closes.slot, c);
+        const S* const numbers = &columns_[path.first_number + j * path.numbers];
+        each_velocity(path, [&](Index v, std::size_t n) { innovation(v) = innovation(v) - numbers[n] * multiplier; });
+        for (const CouplingPath::Passed& passed : path.passed) {
+          const std::vector<std::size_t>& rows = closures()[passed.closure].rows;
+          for (std::size_t i = 0; i < rows.size(); ++i) rho_[rows[i]] = rho_[rows[i]] - numbers[passed.at + i] * multiplier;
+        }
+      }
+    }
+  }
+
   /// r - G^T dlambda, of the solve of a step made last.
-  void subtract_push(Field<S>& residual) const {
-    push(increment_, begin_, residual, minus);
-  }
+  void subtract_push(Field<S>& residual) const { rows_.push(increment_, rows_.at_begin(), residual, minus); }
+  /// And back to r.
+  void add_push(Field<S>& residual) const { rows_.push(increment_, rows_.at_begin(), residual, plus); }
   /// p + G^T kappa, of the solve for velocities made last: what acts beside couplings, where p is what they have left of it.
-  void add_pull(Field<S>& p) const { push(pull_, begin_, p, plus); }
+  void add_pull(Field<S>& p) const { rows_.push(pull_, rows_.at_begin(), p, plus); }
   /// p - G^T kappa, likewise: all that there is of the momenta of these velocities.
-  void take_pull(Field<S>& p) const { push(pull_, begin_, p, minus); }
+  void take_pull(Field<S>& p) const { rows_.push(pull_, rows_.at_begin(), p, minus); }
   /// Of a step: before the evaluation that follows a solve, whatever becomes of the correction, in these lanes.
   void take_multipliers(const Mask& lanes, Field<S>& target) {
     if (empty()) return;
-    push(increment_, begin_, target, [&](const S& now, const S& pushed) { return select(lanes, now + pushed, now); });
-    for (std::size_t j = 0; j < gap_.size(); ++j) lambda_[j] = select(lanes, lambda_[j] + increment_[j], lambda_[j]);
+    rows_.push(increment_, rows_.at_begin(), target, [&](const S& now, const S& pushed) { return select(lanes, now + pushed, now); });
+    for (std::size_t j = 0; j < rows(); ++j) lambda_[j] = select(lanes, lambda_[j] + increment_[j], lambda_[j]);
   }
 
   /// After the last evaluation of a step of h, before bodies are placed at its end: what rows that give way push there. Returns what they took [J].
   S end(double h) {
     if (!gives_way()) return S(0.0);
-    const S loss = springs_.end(h, gap_, pull_);
+    const S loss = springs_.end(h, rows_.gaps(), pull_);
     std::ranges::fill(ends_.flat(), S(0.0));
-    push(pull_, end_, ends_, plus);
+    rows_.push(pull_, rows_.at_end(), ends_, plus);
     return loss;
   }
   /// Once momenta are those at the end of the step: in these lanes.
@@ -245,7 +241,7 @@ class CouplingSweeps {
   void begin_reading(double h, Field<S>& p) {
     if (!gives_way()) return;
     springs_.excess(h, {}, pull_);
-    push(pull_, begin_, p, plus);
+    rows_.push(pull_, rows_.at_begin(), p, plus);
   }
   /// The same of steps of h in the place of that of steps of `from`, times `times`: p of a state that goes on with another step.
   void change_step(double from, double h, double times, Field<S>& p) {
@@ -253,18 +249,18 @@ class CouplingSweeps {
     for (const auto& [step, sign] : {std::pair(from, 1.0), std::pair(h, -1.0)}) {
       springs_.excess(step, {}, pull_);
       for (S& pull : pull_) pull = as<S>(sign * times) * pull;
-      push(pull_, begin_, p, plus);
+      rows_.push(pull_, rows_.at_begin(), p, plus);
     }
   }
   /// Momenta less all of that: those that are read as velocities v.
   void take_excess(double h, const Field<S>& v, Field<S>& p) {
     if (!gives_way()) return;
-    std::vector<S> opening(gap_.size(), S(0.0));
-    for (const CouplingPath& path : paths_.all()) {
-      for (std::size_t row = path.first_row; row < path.last_row; ++row) opening[row] = opening_of(path, row, v);
+    std::vector<S> opening(rows(), S(0.0));
+    for (const CouplingPath& path : paths().all()) {
+      for (std::size_t row = path.first_row; row < path.last_row; ++row) opening[row] = rows_.opening_of(path, row, v);
     }
     springs_.excess(h, opening, pull_);
-    push(pull_, begin_, p, minus);
+    rows_.push(pull_, rows_.at_begin(), p, minus);
   }
   /// Of rows that give way, at q^k [J].
   S potential() const { return springs_.potential(); }
@@ -273,80 +269,91 @@ class CouplingSweeps {
   S rounding() const {
     using std::abs;
     S sum(0.0);
-    for (std::size_t j = 0; j < gap_.size(); ++j) {
-      const S size = scale_[j] * size_[j], pushed = (lambda_[j] + increment_[j]) / scale_[j];
-      sum = sum + size * size * abs(solve_.inverse(j)) + pushed * pushed * abs(moved_by_itself_[j]);
-    }
+    each_row([&](std::size_t row, const ClosureFactor& factor, std::size_t k) {
+      const S& scale = rows_.scales()[row];
+      const S size = scale * rows_.sizes()[row], pushed = (lambda_[row] + increment_[row]) / scale;
+      sum = sum + size * size * abs(factor.solve.inverse(k)) + pushed * pushed * abs(factor.moved_by_itself[k]);
+    });
     return sum;
   }
 
-  /// Sum of the squares of all gaps of rigid rows, each over the root of how far its row would move were its bodies free.
-  S openness() const {
-    S sum(0.0);
-    for (std::size_t j = 0; j < gap_.size(); ++j) {
-      if (is_rigid(j)) sum = sum + (scale_[j] * gap_[j]) * (scale_[j] * gap_[j]);
-    }
-    return sum;
-  }
-
-  /// Of the rigid row that is farthest open beside the size of its mechanism.
-  S widest_gap() const {
-    using std::abs, std::max;
-    S widest(0.0);
-    for (std::size_t j = 0; j < gap_.size(); ++j) {
-      if (is_rigid(j)) widest = max(widest, abs(gap_[j]) / size_[j]);
-    }
-    return widest;
-  }
-
-  std::size_t rows() const { return gap_.size(); }
-  const S& gap(std::size_t row) const { return gap_[row]; }
+  S openness() const { return rows_.openness(); }
+  S widest_gap() const { return rows_.widest_gap(); }
+  std::size_t rows() const { return rows_.count(); }
+  bool is_rigid(std::size_t row) const { return rows_.is_rigid(row); }
+  const S& gap(std::size_t row) const { return rows_.gaps()[row]; }
+  const S& size(std::size_t row) const { return rows_.sizes()[row]; }
   /// Times h^2; of the step solved last.
-  S multiplier(std::size_t row) const { return springs_.whole(row, lambda_[row] + increment_[row]); }
-  /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
-  auto is_held_already(std::size_t row) const { return is_rigid(row) && solve_.inverse(row) == S(0.0); }
-  const S& pivot(std::size_t row) const { return solve_.pivot(row); }
-  const S& size(std::size_t row) const { return size_[row]; }
-  /// How far a unit of impulse along a row opens it, with the factor made last and other rows left out.
-  S yield(std::size_t row) const { return moved_by_itself_[row] / (scale_[row] * scale_[row]); }
-  const Coupling& coupling_of(std::size_t row) const {
-    return *std::ranges::find_if(paths_.all(), [row](const CouplingPath& path) { return row < path.last_row; })->coupling;
+  S multiplier(std::size_t row) const {
+    const S at_begin = lambda_[row] + increment_[row];
+    return is_rigid(row) ? at_begin : springs_.whole(row, at_begin);
   }
+  /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
+  auto is_held_already(std::size_t row) const {
+    const auto [factor, k] = place_of(row);
+    return is_rigid(row) && factor->solve.inverse(k) == S(0.0);
+  }
+  const S& pivot(std::size_t row) const {
+    const auto [factor, k] = place_of(row);
+    return factor->solve.pivot(k);
+  }
+  /// How far a unit of impulse along a row opens it, with the factor made last, loops beyond closed and others open.
+  S yield(std::size_t row) const {
+    const auto [factor, k] = place_of(row);
+    const S& scale = rows_.scales()[row];
+    return factor->moved_by_itself[k] / (scale * scale);
+  }
+  const Coupling& coupling_of(std::size_t row) const { return *paths().path_of(row).coupling; }
 
  private:
   static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
   static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
 
-  /// G v of a row.
-  S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const {
-    const S* g = &begin_[path.first_number + (row - path.first_row) * path.velocities];
-    S sum(0.0);
-    each_on_path(path, [&](Index at_v, std::size_t at_row) { sum = sum + g[at_row] * v(at_v); });
-    return sum;
-  }
+  /// Of the rows that close together.
+  struct ClosureFactor {
+    explicit ClosureFactor(std::size_t rows)
+        : solve(rows), fresh(rows), moved_by_itself(rows, S(0.0)), up(6 * rows, S(0.0)), down(6 * rows, S(0.0)), right_side(rows, S(0.0)) {}
+    MaskedSolve<S> solve, fresh;
+    std::vector<S> moved_by_itself;  // diagonal of S, scaled
+    std::vector<S> up, down;         // b of each column, S^-1 y^T
+    std::vector<S> right_side;       // scratch
+  };
 
-  static Placement<S> placement_of(const Pose& pose) {
-    double numbers[12];
-    std::ranges::copy(pose.rotation, numbers);
-    std::ranges::copy(pose.shift, numbers + 9);
-    return Placement<S>::from(numbers);
+  const CouplingPaths& paths() const { return rows_.paths(); }
+  std::span<const Closure> closures() const { return rows_.paths().closures(); }
+  /// Where a row is among those that close with it.
+  std::pair<const ClosureFactor*, std::size_t> place_of(std::size_t row) const {
+    const CouplingPath& path = paths().path_of(row);
+    return {&factors_[path.closure], path.first_in_closure + (row - path.first_row)};
   }
-  static std::size_t at(const CouplingPath& path, std::size_t k) { return static_cast<std::size_t>(path.reach[k].at); }
-
-  template <JointKind Kind>
-  static void put(Joint<Kind>, const Wrench<S>& value, S* numbers) {
-    if constexpr (Kind == JointKind::screw) {
-      numbers[0] = value.n.x;
-    } else {
-      value.n.to(numbers);
-      if constexpr (Kind == JointKind::free) value.f.to(numbers + 3);
+  /// visit(row, factor, number of the row in it).
+  template <class Visit>
+  void each_row(const Visit& visit) const {
+    for (std::size_t closure = 0; closure < factors_.size(); ++closure) {
+      for (std::size_t k = 0; k < closures()[closure].rows.size(); ++k) visit(closures()[closure].rows[k], factors_[closure], k);
     }
   }
-  /// A row of numbers, joint by joint; none above the path.
+  /// visit(velocity row, where it is among the path's numbers).
+  template <class Visit>
+  void each_velocity(const CouplingPath& path, const Visit& visit) const {
+    for (const CouplingPath::Joint& joint : path.joints) {
+      const Index first = model_.tree.first_v(joint.slot);
+      for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) visit(first + k, static_cast<std::size_t>(joint.at + k));
+    }
+  }
+
+  template <JointKind Kind>
+  static void put(Joint<Kind>, const Wrench<S>& value, const Mask& lanes, S* numbers) {
+    S now[6];
+    value.n.to(now);
+    if constexpr (Kind == JointKind::free) value.f.to(now + 3);
+    for (Index k = 0; k < velocity_count(Kind); ++k) numbers[k] = select(lanes, now[k], numbers[k]);
+  }
+  /// A row of numbers, joint by joint; none above those that move the bodies against each other.
   static auto numbers_of(const CouplingPath& path, const S* numbers) {
     return [&path, numbers]<JointKind Kind>(Joint<Kind>, std::size_t k) {
       const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-      const std::size_t first = at(path, k);
+      const auto first = static_cast<std::size_t>(path.joints[k].at);
       if (first >= path.on_path) return Wrench<S>{zero, zero};
       const S* const from = numbers + first;
       if constexpr (Kind == JointKind::screw) return Wrench<S>{{from[0], S(0.0), S(0.0)}, zero};
@@ -354,172 +361,223 @@ class CouplingSweeps {
       return Wrench<S>{Vec3<S>::from(from), Kind == JointKind::free ? Vec3<S>::from(from + (Kind == JointKind::free ? 3 : 0)) : zero};
     };
   }
+  /// Sum of the products of what two paths share, `meeting` as the first has it.
+  static S product(const CouplingPath::Meeting& meeting, const S* of_first, const S* of_second) {
+    S sum(0.0);
+    for (const CouplingPath::Shared& shared : meeting.shared) {
+      const S *const a = of_first + shared.at_first, *const b = of_second + shared.at_second;
+      for (std::size_t k = 0; k < shared.count; ++k) sum = sum + a[k] * b[k];
+    }
+    return sum;
+  }
+
+  /// What is left of a column of G^T where joints, and loops that are closed below, have yielded.
+  template <class Element, class PlacementOf>
+  void column_up(const CouplingPath& path, std::size_t j, const BodyConstants<Element>& constants, const PlacementOf& placement_of,
+                 const Gains<S>& gains, MimicTies<S>& ties, const Mask& lanes) {
+    S* const numbers = &columns_[path.first_number + j * path.numbers];
+    const auto past = [&](const CouplingPath::Passed& passed, std::size_t first_meeting) {
+      ClosureFactor& below = factors_[passed.closure];
+      std::size_t at = 0;
+      for (std::size_t m = 0; m < closures()[passed.closure].paths.size(); ++m) {
+        const CouplingPath::Meeting& meeting = path.meetings[first_meeting + m];
+        const CouplingPath& other = paths().all()[meeting.path];
+        for (std::size_t i = 0; i < other.rows(); ++i, ++at) {
+          below.right_side[at] = product(meeting, numbers, &across_[other.first_number + i * other.numbers]);
+        }
+      }
+      solve(passed.closure);
+      for (std::size_t i = 0; i < at; ++i) numbers[passed.at + i] = select(lanes, below.right_side[i], numbers[passed.at + i]);
+      return passed_up(passed.closure);
+    };
+    const auto keep = [&](auto joint, std::size_t k, const Wrench<S>& u) { put(joint, u, lanes, numbers + path.joints[k].at); };
+    way_up(path, constants, placement_of, gains.up, numbers_of(path, &rows_.at_begin()[path.first_velocity + j * path.velocities]), past, keep);
+    keep_passed(path, j, lanes, factors_[path.closure].up);
+    if (ties.empty()) return;
+    moved_ties(ties, path.slots, [&](Index, Index n) { return numbers[n]; });
+    std::ranges::copy(*tied_moved_, tied_columns_.begin() + static_cast<std::ptrdiff_t>((path.first_row + j) * pulls_.size()));
+  }
+  /// What a row of J becomes: of each joint the number that u counts by.
+  template <class Element, class PlacementOf>
+  void row_up(const CouplingPath& path, std::size_t j, const std::vector<S>& jacobian, const BodyConstants<Element>& constants,
+              const PlacementOf& placement_of, const Gains<S>& gains, const MimicTies<S>& ties, const Mask& lanes) {
+    S* const numbers = &across_[path.first_number + j * path.numbers];
+    const S* const row = &jacobian[path.first_velocity + j * path.velocities];
+    const auto past = [&](const CouplingPath::Passed& passed, std::size_t first_meeting) {
+      const ClosureFactor& below = factors_[passed.closure];
+      std::array<S, 6> sum;
+      sum.fill(S(0.0));
+      std::size_t at = 0;
+      for (std::size_t m = 0; m < closures()[passed.closure].paths.size(); ++m) {
+        const CouplingPath::Meeting& meeting = path.meetings[first_meeting + m];
+        const CouplingPath& other = paths().all()[meeting.path];
+        for (std::size_t i = 0; i < other.rows(); ++i, ++at) {
+          const S moved = product(meeting, numbers, &columns_[other.first_number + i * other.numbers]);
+          numbers[passed.at + at] = select(lanes, S(0.0) - moved, numbers[passed.at + at]);
+          for (std::size_t c = 0; c < 6; ++c) sum[c] = sum[c] + below.down[6 * at + c] * moved;
+        }
+      }
+      return Wrench<S>::from(sum.data());
+    };
+    const auto keep = [&](auto joint, std::size_t k, const Wrench<S>& y) {
+      put(joint, apply_inverse_transposed(joint, gains.inverse, model_.tree.first_block(path.slots[k]), y), lanes, numbers + path.joints[k].at);
+    };
+    way_up(path, constants, placement_of, gains.down, numbers_of(path, row), past, keep);
+    keep_passed(path, j, lanes, factors_[path.closure].down);
+    for (std::size_t c = 0; c < ties.coordinates(); ++c) {
+      S sum(0.0);
+      rows_.each_on_path(path, [&](Index v, std::size_t n) { sum = sum + row[n] * ties.response(c)(v); });
+      S& kept = tied_across_[(path.first_row + j) * ties.coordinates() + c];
+      kept = select(lanes, sum, kept);
+    }
+  }
+  /// past(passed, first of its meetings): what the body where it closes gets less.
+  template <class Element, class PlacementOf, class Given, class Past, class Keep>
+  void way_up(const CouplingPath& path, const BodyConstants<Element>& constants, const PlacementOf& placement_of,
+              const Field<S, 6>& gain, const Given& given, const Past& past, const Keep& keep) {
+    auto next = path.passed.begin();
+    std::size_t meeting = closures()[path.closure].paths.size();
+    impulse_along_up(
+        model_.tree, constants, placement_of, gain, path.slots, path.closes_at,
+        [&](Index slot) {
+          for (; next != path.passed.end() && slot_of(next->closure) == slot; ++next) {
+            store(bias_, slot, load<Wrench, S>(bias_, slot) - past(*next, meeting));
+            meeting += closures()[next->closure].paths.size();
+          }
+        },
+        given, keep, bias_);
+  }
+  /// What has come to the body where a path closes, of its row j.
+  void keep_passed(const CouplingPath& path, std::size_t j, const Mask& lanes, std::vector<S>& kept) {
+    const Index slot = path.closes_at;
+    if (slot == 0) return;
+    for (int c = 0; c < 6; ++c) {
+      S& number = kept[6 * (path.first_in_closure + j) + static_cast<std::size_t>(c)];
+      number = select(lanes, bias_(slot, c), number);
+    }
+  }
+
+  /// S^-1 of the right side of a closure, in place.
+  void solve(std::size_t closure) {
+    ClosureFactor& kept = factors_[closure];
+    const std::vector<std::size_t>& rows = closures()[closure].rows;
+    for (std::size_t k = 0; k < rows.size(); ++k) kept.right_side[k] = rows_.scales()[rows[k]] * kept.right_side[k];
+    kept.solve.solve(kept.right_side);
+    for (std::size_t k = 0; k < rows.size(); ++k) kept.right_side[k] = rows_.scales()[rows[k]] * kept.right_side[k];
+  }
+  /// b times what was solved for last.
+  Wrench<S> passed_up(std::size_t closure) const {
+    const ClosureFactor& kept = factors_[closure];
+    std::array<S, 6> sum;
+    sum.fill(S(0.0));
+    for (std::size_t k = 0; k < kept.right_side.size(); ++k) {
+      for (std::size_t c = 0; c < 6; ++c) sum[c] = sum[c] + kept.up[6 * k + c] * kept.right_side[k];
+    }
+    return Wrench<S>::from(sum.data());
+  }
+
+  /// S of the rows of a closure, scaled, from rows and columns, and its factor; y^T becomes S^-1 y^T.
+  void factor(std::size_t closure, Coupled of, std::size_t coordinates, const Mask& lanes, double damping) {
+    const Closure& closes = closures()[closure];
+    ClosureFactor& kept = factors_[closure];
+    const std::vector<S>& scale = rows_.scales();
+    std::size_t j = 0;
+    for (const std::size_t k : closes.paths) {
+      const CouplingPath& path = paths().all()[k];
+      for (std::size_t row = path.first_row; row < path.last_row; ++row, ++j) {
+        const S* const y = &across_[path.first_number + (row - path.first_row) * path.numbers];
+        std::size_t c = 0;
+        for (std::size_t m = 0; m < closes.paths.size(); ++m) {
+          const CouplingPath& other = paths().all()[path.meetings[m].path];
+          for (std::size_t column = other.first_row; column < other.last_row; ++column, ++c) {
+            S sum = product(path.meetings[m], y, &columns_[other.first_number + (column - other.first_row) * other.numbers]);
+            for (std::size_t n = 0; n < coordinates; ++n) sum = sum + tied_across_[row * coordinates + n] * tied_columns_[column * coordinates + n];
+            kept.fresh.at(j, c) = scale[row] * (scale[column] * sum);
+          }
+        }
+        kept.moved_by_itself[j] = select(lanes, kept.fresh.at(j, j), kept.moved_by_itself[j]);
+        S& diagonal = kept.fresh.at(j, j);
+        diagonal = diagonal + as<S>(damping);
+        if (!is_rigid(row)) diagonal = diagonal + scale[row] * scale[row] * as<S>(springs_.yield(of, row));
+      }
+    }
+    kept.fresh.factor();
+    kept.solve.take(kept.fresh, lanes);
+    for (std::size_t c = 0; closes.slot != 0 && c < 6; ++c) {
+      for (j = 0; j < closes.rows.size(); ++j) kept.right_side[j] = kept.down[6 * j + c];
+      solve(closure);
+      for (j = 0; j < closes.rows.size(); ++j) kept.down[6 * j + c] = select(lanes, kept.right_side[j], kept.down[6 * j + c]);
+    }
+  }
+  /// b S^-1 y^T.
+  std::array<S, 36> felt_above(std::size_t closure) const {
+    std::array<S, 36> felt;
+    felt.fill(S(0.0));
+    if (slot_of(closure) == 0) return felt;
+    const ClosureFactor& kept = factors_[closure];
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c < 6; ++c) {
+        S& number = felt[static_cast<std::size_t>(row_start(r) + column_start(c))];
+        for (std::size_t k = 0; k < kept.right_side.size(); ++k) {
+          number = number + kept.up[6 * k + static_cast<std::size_t>(r)] * kept.down[6 * k + static_cast<std::size_t>(c)];
+        }
+      }
+    }
+    return felt;
+  }
 
   /// What coordinates that are tied feel of impulses, as rows.
   template <class Element, class PlacementOf>
   void feel(const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Gains<S>& gains, const MimicTies<S>& ties, const Mask& lanes) {
+    const std::span<const Index> slots = paths().reached();
     for (std::size_t c = 0; c < ties.coordinates(); ++c) {
-      clear_left();
+      std::ranges::fill(tied_.flat(), S(0.0));
       ties.each_member([&](Index, Index row, double multiplier, std::size_t coordinate) {
-        if (coordinate == c) left_(row) = as<S>(kHold<S> * multiplier);
+        if (coordinate == c) tied_(row) = as<S>(kHold<S> * multiplier);
       });
-      const std::span<const Index> slots = paths_.reached();
       impulse_along_up(
-          model_.tree, constants, placement_of, gains.down, slots,
-          [&](auto joint, std::size_t k) { return load_joint(joint, left_, model_.tree.first_v(slots[k])); },
-          [&](auto joint, std::size_t k, const Wrench<S>&, const Wrench<S>& y) {
-            S now[6];
-            put(joint, y, now);
-            for (Index n = 0; n < velocity_count(joint); ++n) {
-              S& kept = felt_[c](model_.tree.first_v(slots[k]) + n);
-              kept = select(lanes, now[n], kept);
-            }
+          model_.tree, constants, placement_of, gains.down, slots, 0, [](Index) {},
+          [&](auto joint, std::size_t k) { return load_joint(joint, tied_, model_.tree.first_v(slots[k])); },
+          [&](auto joint, std::size_t k, const Wrench<S>& y) {
+            put(joint, apply_inverse_transposed(joint, gains.inverse, model_.tree.first_block(slots[k]), y), lanes, &felt_[c](model_.tree.first_v(slots[k])));
           },
           bias_);
     }
   }
-  /// How these coordinates move, after left_ = d^-1 u.
-  const std::vector<S>& moved_ties(MimicTies<S>& ties) {
+  /// How these coordinates move; u(velocity row, its number among those of the slots).
+  template <class Innovation>
+  void moved_ties(MimicTies<S>& ties, std::span<const Index> slots, const Innovation& u) {
     for (std::size_t c = 0; c < pulls_.size(); ++c) {
       pulls_[c] = S(0.0);
-      for (const Index i : paths_.reached()) {
+      Index n = 0;
+      for (const Index i : slots) {
         for (Index k = 0; k < velocity_count(model_.tree.kind(i)); ++k) {
-          const Index row = model_.tree.first_v(i) + k;
-          pulls_[c] = pulls_[c] + felt_[c](row) * left_(row);
+          const Index v = model_.tree.first_v(i) + k;
+          pulls_[c] = pulls_[c] + felt_[c](v) * u(v, n++);
         }
       }
     }
-    return ties.moved_by(pulls_);
-  }
-
-  void clear_left() {
-    for (const Index i : paths_.reached()) {
-      for (Index k = 0; k < velocity_count(model_.tree.kind(i)); ++k) left_(model_.tree.first_v(i) + k) = S(0.0);
-    }
-  }
-
-  /// S, scaled, from rows and columns.
-  void multiply(std::size_t coordinates) {
-    const std::span<const CouplingPath> all = paths_.all();
-    for (std::size_t first = 0; first < all.size(); ++first) {
-      for (std::size_t second = 0; second < all.size(); ++second) {
-        const CouplingPath &of_row = all[first], &of_column = all[second];
-        const std::span<const CouplingPaths::Shared> shared = paths_.shared(first, second);
-        for (std::size_t j = 0; j < of_row.rows(); ++j) {
-          const S* const y = &across_[of_row.first_number + j * of_row.velocities];
-          for (std::size_t c = 0; c < of_column.rows(); ++c) {
-            const S* const x = &moved_[of_column.first_number + c * of_column.velocities];
-            S sum(0.0);
-            for (const CouplingPaths::Shared& joint : shared) {
-              for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) {
-                sum = sum + y[joint.at_first + k] * x[joint.at_second + k];
-              }
-            }
-            const std::size_t row = of_row.first_row + j, column = of_column.first_row + c;
-            for (std::size_t m = 0; m < coordinates; ++m) {
-              sum = sum + tied_across_[row * coordinates + m] * tied_moved_[column * coordinates + m];
-            }
-            fresh_.at(row, column) = scale_[row] * (scale_[column] * sum);
-          }
-        }
-      }
-    }
-  }
-
-  /// Gaps where bodies are at pose(slot) and coordinates moved by delta(row), and how joints change them; scales as well where it is asked.
-  template <class PoseOf, class DeltaOf>
-  void look(const PoseOf& pose, const DeltaOf& delta, std::vector<S>& numbers, bool scales) {
-    std::size_t term = 0;
-    for (const CouplingPath& path : paths_.all()) {
-      const Coupling& coupling = *path.coupling;
-      if (coupling.kind == CouplingKind::gear) {
-        S& gap = gap_[path.first_row] = as<S>(coupling.offset);
-        for (std::size_t k = 0; k < coupling.terms.size(); ++k, ++term) {
-          gap = gap + as<S>(coupling.terms[k].ratio) * (at_start_[term] + delta(coupling.terms[k].v_row));
-          numbers[path.first_number + path.terms[k]] = as<S>(coupling.terms[k].ratio);
-        }
-        if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.gear_yield));
-        continue;
-      }
-      const Placement<S> A = placed_in(pose(coupling.slot_a), placement_of(coupling.frame_a)),
-                         B = placed_in(pose(coupling.slot_b), placement_of(coupling.frame_b));
-      const std::span<const GapRow> kinds = rows_of(coupling.kind);
-      std::array<Gap<S>, 6> gaps;
-      for (std::size_t j = 0; j < kinds.size(); ++j) {
-        gaps[j] = gap_of(kinds[j], coupling.length, A, B);
-        gap_[path.first_row + j] = gaps[j].gap;
-      }
-      for (const CouplingPath::Joint& on : path.reach) {
-        if (on.sign == 0) continue;
-        const Placement<S> T = pose(on.slot);
-        with_joint(model_.tree.kind(on.slot), [&](auto joint) {
-          for (std::size_t j = 0; j < kinds.size(); ++j) {
-            gap_along(joint, model_.constants, on.slot, T, B.p, gaps[j], as<S>(on.sign),
-                      &numbers[path.first_number + j * path.velocities + static_cast<std::size_t>(on.at)]);
-          }
-        });
-      }
-      for (std::size_t j = 0; scales && j < kinds.size(); ++j) scale_[path.first_row + j] = scale_of(path, gaps[j], B.p, pose);
-    }
-  }
-
-  /// 1 / root of how far a row would move were its bodies free.
-  template <class PoseOf>
-  static S scale_of(const CouplingPath& path, const Gap<S>& gap, const Vec3<S>& x_b, const PoseOf& pose) {
-    using std::sqrt;
-    const auto moved = [&](Index slot, const std::array<double, 36>& yield) {
-      const Placement<S> T = pose(slot);
-      const Vec3<S> moment = gap.couple + cross(x_b - T.p, gap.force);
-      const Twist<S> w{transpose_times(T.R, moment), transpose_times(T.R, gap.force)};
-      const Wrench<S> moves = Mat6<S>::from(yield.data()) * w;  // a wrench in, a twist out: the names are those of an inertia
-      return dot(moves, w);
-    };
-    return S(1.0) / sqrt(moved(path.coupling->slot_a, path.yield_a) + moved(path.coupling->slot_b, path.yield_b));
-  }
-
-  /// visit(velocity row, where it is among the reach's) of a path.
-  template <class Visit>
-  void each_on_path(const CouplingPath& path, const Visit& visit) const {
-    for (const CouplingPath::Joint& joint : path.reach) {
-      if (joint.sign == 0) continue;
-      const Index first = model_.tree.first_v(joint.slot);
-      for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) visit(first + k, static_cast<std::size_t>(joint.at + k));
-    }
-  }
-  /// to = combine(to, G^T multipliers) on the paths, row by row; numbers: those of G, or J.
-  template <class Combine>
-  void push(const std::vector<S>& multipliers, const std::vector<S>& numbers, Field<S>& to, const Combine& combine) const {
-    for (const CouplingPath& path : paths_.all()) {
-      each_on_path(path, [&](Index v, std::size_t at_row) {
-        S sum(0.0);
-        for (std::size_t j = 0; j < path.rows(); ++j) {
-          sum = sum + multipliers[path.first_row + j] * numbers[path.first_number + j * path.velocities + at_row];
-        }
-        to(v) = combine(to(v), sum);
-      });
-    }
+    tied_moved_ = &ties.moved_by(pulls_);
   }
 
   const Model& model_;
-  CouplingPaths paths_;
-  std::vector<Index> slots_;     // of the reach of each
-  Field<S, 12> pose_;            // body -> world at q^k, of bodies that are reached
-  std::vector<S> begin_, end_;   // G at q^k, J at q^k+1: of each row what every velocity of its reach does
-  std::vector<S> at_start_;      // coordinates of gears at q^k
-  std::vector<S> gap_, size_, scale_, lambda_;
-  std::vector<S> moved_by_itself_;  // diagonal of S, scaled
-  std::vector<S> increment_;     // of lambda, by the solve made last
-  std::vector<S> pull_;          // likewise, of velocities and positions
-  std::vector<S> across_, tied_across_;  // of each row, what J becomes; for velocities of the reach, for coordinates that are tied
-  std::vector<Field<S>> felt_;           // of each coordinate that is tied, what it feels; of the reach
-  std::vector<S> pulls_;                 // by the solve there is
-  std::vector<S> moved_, tied_moved_;    // of each column, how its reach yields: scratch of a factor
-  MaskedSolve<S> solve_, fresh_;
+  CouplingRows<S> rows_;
+  std::vector<S> lambda_;
+  std::vector<S> increment_;  // of lambda, by the solve made last
+  std::vector<S> pull_;       // likewise, of velocities and positions
+  std::vector<S> rho_;        // of the solve there is
+  std::vector<S> across_;     // of each row and number of its path: how u counts there, of closures their rho
+  std::vector<S> columns_;    // of each column likewise: u, of closures rho
+  std::vector<ClosureFactor> factors_;
   CouplingSprings<S> springs_;
-  Field<S> ends_;                        // what springs push at the end of a step
-  bool keeps_scales_ = false;
-  Field<S, 6> bias_;             // scratch
-  Field<S> left_;                // likewise; of the reach
+  Field<S> ends_;             // what springs push at the end of a step
+  Field<S, 6> bias_;          // scratch
+  // where joints are tied
+  std::vector<Field<S>> felt_;                  // of each coordinate, how u counts for it
+  std::vector<S> tied_across_, tied_columns_;   // of each row and coordinate
+  std::vector<S> pulls_;                        // scratch
+  const std::vector<S>* tied_moved_ = nullptr;  // by the solve there is
+  Field<S> tied_;                               // scratch
 };
 
 }  // namespace linden

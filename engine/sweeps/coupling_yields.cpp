@@ -41,7 +41,7 @@ void turn_at_random(const Model& model, Random& random, Field<double>& q) {
 std::vector<double> row_yields(const Model& model, std::span<const Armature> rotors) {
   if (std::ranges::none_of(model.couplings, gives_way)) return {};
   const Tree& tree = model.tree;
-  CouplingSweeps<double> couplings(model, {});
+  CouplingSweeps<double> couplings(model, {}, Closing::at_world);
   Workspace<double> work;
   work.allocate(tree.shape);
   Field<double> q, rotor;
@@ -70,7 +70,9 @@ std::vector<double> row_yields(const Model& model, std::span<const Armature> rot
           [&](Index i) { return tied_load(tree, model.constants, gains, work.bias, work.variation, i); }, work.increment);
     }
     couplings.place(work.placement, q);
-    couplings.factor(Coupled::velocities, model.constants, work.placement, nullptr, gains, ties, true);
+    couplings.up_to_closures([](Slots) {}, [&](std::size_t closure) {
+      couplings.close(closure, Coupled::velocities, model.constants, work.placement, nullptr, gains, ties, true);
+    });
     for (std::size_t row = 0; row < yields.size(); ++row) {
       const double yield = couplings.yield(row);
       if (std::isfinite(yield)) yields[row] = std::max(yields[row], yield);

@@ -34,6 +34,7 @@
 #include "kernels/tree/increment_down.hpp"
 #include "kernels/tree/innovation_up.hpp"
 #include "kernels/tree/momentum_update_map.hpp"
+#include "kernels/tree/residual_up.hpp"
 #include "kernels/tree/rounding_floor_map.hpp"
 #include "layout/workspace.hpp"
 
@@ -169,7 +170,7 @@ class LaneSweeps {
   Evaluated<Pack> evaluate(Lanes active, Lanes corrected, int round) {
     const Mask mask = L::mask(corrected);
     if (coupled()) take_multipliers(L::mask(active));
-    const Evaluation<Pack> moved = tied() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
+    const Evaluation<Pack> moved = is_solved() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
     const Pack before = norm_;
     const Evaluated<Pack> now = evaluated(moved, active & ~corrected, corrected & slow_);
     slow_ = (slow_ & ~corrected) | (corrected & ~L::bits(now.norm <= number(kWorn * kWorn) * before));
@@ -306,66 +307,93 @@ class LaneSweeps {
     return now;
   }
   void make_factor(Lanes lanes, Jacobian jacobian) {
-    const auto factor = [&](const auto& added) { block_factor_up(tree_, constants_, work_, factor_.fresh(), jacobian, added); };
-    const auto factor_tied = [&](const auto& added) { tied() ? factor(factor_.fresh_ties().held(added)) : factor(added); };
-    if constexpr (kEffects) {
-      effects_.with_added(factor_tied);
-    } else {
-      factor_tied(NothingAdded{});
-    }
-    if (tied()) tie(&LaneSweeps::increments);
-    if (coupled()) factor_couplings(Coupled::step, factor_.fresh(), L::mask(lanes));
+    const auto factor_part = [&](Slots part) {
+      const auto factor = [&](const auto& added) { block_factor_up(tree_, constants_, part, work_, factor_.fresh(), jacobian, added); };
+      const auto factor_tied = [&](const auto& added) { tied() ? factor(factor_.fresh_ties().held(added)) : factor(added); };
+      if constexpr (kEffects) {
+        effects_.with_added(factor_tied);
+      } else {
+        factor_tied(NothingAdded{});
+      }
+    };
+    couplings_.up_to_closures(
+        [&](Slots part) {
+          factor_part(part);
+          if (tied()) tie(&LaneSweeps::increments);
+        },
+        [&](std::size_t closure) { close(closure, Coupled::step, factor_.fresh(), L::mask(lanes)); });
     factor_.take(lanes, work_);
   }
   /// The second half of a solve: increments or rates.
-  using Down = void (LaneSweeps::*)(const Gains<Pack>& gains, Field<Pack>& x);
+  using Down = void (LaneSweeps::*)(const Gains<Pack>& gains, Slots part, Field<Pack>& x);
   /// Where joints are tied to each other, what becomes of a factor with them held.
   [[gnu::noinline]] void tie(Down down) {
     const Gains<Pack> gains = factor_.fresh();
     factor_.fresh_ties().factor(
         [&](const Field<Pack>& r, Field<Pack>& x) {
-          impulses_up(gains, r);
-          (this->*down)(gains, x);
+          impulses_up(gains, r, all_slots(tree_));
+          (this->*down)(gains, all_slots(tree_), x);
         },
         [&](Index i) { return tied_load(tree_, constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
   }
   // not inline: each is called in several places, and takes seconds to compile
-  [[gnu::noinline]] void impulses_up(const Gains<Pack>& gains, const Field<Pack>& r) {
-    impulse_pass_up(tree_, constants_, work_.placement, gains, r, work_.bias, work_.innovation);
+  [[gnu::noinline]] void impulses_up(const Gains<Pack>& gains, const Field<Pack>& r, Slots part) {
+    impulse_pass_up(tree_, constants_, work_.placement, gains, r, part, work_.bias, work_.innovation);
   }
-  [[gnu::noinline]] void increments(const Gains<Pack>& gains, Field<Pack>& x) {
-    increment_down(tree_, constants_, work_.placement, work_.motion, gains, work_.innovation, work_.variation, x);
+  [[gnu::noinline]] void increments(const Gains<Pack>& gains, Slots part, Field<Pack>& x) {
+    increment_down<true>(tree_, constants_, work_.placement, work_.motion, gains, work_.innovation, part, work_.variation, x);
   }
-  [[gnu::noinline]] void rates(const Gains<Pack>& gains, Field<Pack>& x) {
-    rate_down(tree_, constants_, work_.placement, gains, work_.innovation, work_.variation, x);
+  [[gnu::noinline]] void rates(const Gains<Pack>& gains, Slots part, Field<Pack>& x) {
+    rate_down(tree_, constants_, work_.placement, gains, work_.innovation, part, work_.variation, x);
   }
   template <class Added>
-  [[gnu::noinline]] void find_articulated_inertias(const Added& added) {
-    articulated_inertia_up(tree_, constants_, work_.placement, work_.articulated, mass_gains(), added);
+  [[gnu::noinline]] void find_articulated_inertias(const Added& added, Slots part) {
+    articulated_inertia_up(tree_, constants_, work_.placement, part, work_.articulated, mass_gains(), added);
   }
-  /// Residual and first half of a solve; of joints that are tied all of it, the correction in work_.increment. Returns the norm.
+  /// Residual and first half of a solve; of what ties joints, or bodies, all of it, the correction in work_.increment. Returns the norm.
   Pack pass_up() {
-    Pack norm = innovation_up(tree_, constants_, work_);
-    if (coupled()) {
-      give_way(Coupled::step, {work_.gain_up, work_.gain_down, work_.joint_inverse}, factor_.ties(), &work_.impulse);
-      norm = energy_norm(tree_, work_.joint_inverse, work_.innovation);
-    }
+    if (coupled()) return solve_coupled();
+    const Pack norm = innovation_up(tree_, constants_, work_);
     if (!tied()) return norm;
-    increments({work_.gain_up, work_.gain_down, work_.joint_inverse}, work_.increment);
+    increments({work_.gain_up, work_.gain_down, work_.joint_inverse}, all_slots(tree_), work_.increment);
     const Pack of_ties = factor_.ties().complete(work_.increment);
     fold_mimics(factor_.ties().mimics(), work_.innovation);
     return norm + of_ties;
   }
   bool tied() { return !factor_.ties().empty(); }
   bool coupled() const { return !couplings_.empty(); }
+  /// Whether an evaluation finds the correction, not its first half alone.
+  bool is_solved() { return tied() || coupled(); }
 
   // what couplings do (coupling_sweeps.hpp); not inline, as above
   [[gnu::noinline]] void find_gaps() { couplings_.find_gaps(work_.displacement, work_.delta); }
-  [[gnu::noinline]] void factor_couplings(Coupled of, const Gains<Pack>& gains, const Mask& lanes) {
-    couplings_.factor(of, constants_, work_.placement, of == Coupled::step ? &work_.motion : nullptr, gains, factor_.fresh_ties(), lanes);
+  [[gnu::noinline]] void close(std::size_t closure, Coupled of, const Gains<Pack>& gains, const Mask& lanes) {
+    const std::array<Pack, 36> felt =
+        couplings_.close(closure, of, constants_, work_.placement, of == Coupled::step ? &work_.motion : nullptr, gains, factor_.fresh_ties(), lanes);
+    if (couplings_.slot_of(closure) != 0) add_inertia(couplings_.slot_of(closure), felt, work_.articulated);
   }
-  [[gnu::noinline]] void give_way(Coupled of, const Gains<Pack>& gains, MimicTies<Pack>& ties, Field<Pack, 6>* with) {
-    couplings_.give_way(of, constants_, work_.placement, gains, ties, work_.innovation, with);
+  /// x of r; with the factor of a step, or with that of the mass matrix.
+  [[gnu::noinline]] void solve_closed(Coupled of, const Gains<Pack>& gains, MimicTies<Pack>& ties, const Field<Pack>& r, Down down, Field<Pack>& x) {
+    couplings_.begin_solve(of);
+    couplings_.up_to_closures([&](Slots part) { impulses_up(gains, r, part); },
+                              [&](std::size_t closure) { couplings_.yield(closure, ties, work_.innovation, work_.bias); });
+    couplings_.down_from_closures([&](Slots part) { (this->*down)(gains, part, x); },
+                                  [&](std::size_t closure) { couplings_.push(closure, of, work_.variation, work_.innovation); });
+    if (!ties.empty()) ties.complete(x);
+  }
+  /// All of a solve of a step, and the residual that it leaves in work_.innovation. Returns its norm.
+  [[gnu::noinline]] Pack solve_coupled() {
+    using std::abs;
+    residual_up(tree_, constants_, work_.placement, work_.momentum_target, work_.impulse, work_.residual);
+    fold_mimics(factor_.ties().mimics(), work_.residual);
+    solve_closed(Coupled::step, {work_.gain_up, work_.gain_down, work_.joint_inverse}, factor_.ties(), work_.residual, &LaneSweeps::increments,
+                 work_.increment);
+    couplings_.subtract_push(work_.residual);
+    fold_mimics(factor_.ties().mimics(), work_.residual);
+    std::ranges::copy(work_.residual.flat(), work_.innovation.flat().begin());
+    Pack norm(Real(0));
+    for (Index row = 0; row < work_.residual.rows(); ++row) norm = norm + work_.residual(row) * work_.increment(row);
+    return abs(norm);
   }
   [[gnu::noinline]] void take_multipliers(const Mask& lanes) {
     Field<Pack>* target = &work_.momentum_target;
@@ -394,13 +422,13 @@ class LaneSweeps {
 
   template <class Added>
   [[gnu::noinline]] void factor_mass(const Added& added, Coupled of = Coupled::velocities) {
-    if (!tied()) {
-      find_articulated_inertias(added);
-    } else {
-      find_articulated_inertias(factor_.fresh_ties().held(added));
-      tie(&LaneSweeps::rates);
-    }
-    if (coupled()) factor_couplings(of, mass_gains(), L::mask(~Lanes(0)));
+    couplings_.up_to_closures(
+        [&](Slots part) {
+          if (!tied()) return find_articulated_inertias(added, part);
+          find_articulated_inertias(factor_.fresh_ties().held(added), part);
+          tie(&LaneSweeps::rates);
+        },
+        [&](std::size_t closure) { close(closure, of, mass_gains(), L::mask(~Lanes(0))); });
   }
   template <class Added>
   [[gnu::noinline]] void find_rate(const Added& added) {
@@ -410,13 +438,10 @@ class LaneSweeps {
     }
     const Gains<Pack> gains = mass_gains();
     mass_solve_up(tree_, constants_, work_.placement, p_, work_.articulated, gains.down, gains.inverse, work_.bias, work_.innovation, added);
-    rates(gains, work_.increment);
+    rates(gains, all_slots(tree_), work_.increment);
   }
-  [[gnu::noinline]] void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate, Coupled of = Coupled::velocities) {
-    impulses_up(mass_gains(), right_side);
-    if (coupled()) give_way(of, mass_gains(), factor_.fresh_ties(), nullptr);
-    rates(mass_gains(), rate);
-    if (tied()) factor_.fresh_ties().complete(rate);
+  void apply_mass_inverse(const Field<Pack>& right_side, Field<Pack>& rate, Coupled of = Coupled::velocities) {
+    solve_closed(of, mass_gains(), factor_.fresh_ties(), right_side, &LaneSweeps::rates, rate);
   }
   /// Followers to where their leaders are, without what rounding adds up to.
   void follow_leaders() {

@@ -21,14 +21,42 @@ void with_ties(Memory m, const Added& added, const Action& action) {
   action(m.ties.held(added));
 }
 
+/// Couplings that close together; newton: within the factor of the Jacobian, else within that of the mass matrix.
+template <bool kNewton>
+void close(Memory m, std::size_t closure, Coupled of, const Gains<double>& gains) {
+  const std::array<double, 36> felt = m.couplings.close(closure, of, m.constants, m.work.placement, kNewton ? &m.work.motion : nullptr, gains, m.ties, true);
+  const Index slot = m.couplings.slot_of(closure);
+  if (slot == 0) return;
+  if constexpr (kNewton) {
+    add_inertia(m.model.tree, all_slots(m.model.tree), slot, felt, m.work.articulated);
+  } else {
+    add_inertia(slot, felt, m.work.articulated);
+  }
+}
+template <bool kNewton>
+void close_at_world(Memory m, Coupled of, const Gains<double>& gains) {
+  m.couplings.up_to_closures([](Slots) {}, [&](std::size_t closure) {
+    if (m.couplings.slot_of(closure) == 0) close<kNewton>(m, closure, of, gains);
+  });
+}
+/// A factor by sweep(slots), leaves to root, with couplings that close on the way.
+template <bool kNewton, class Sweep>
+void factor_to_world(Memory m, Coupled of, const Gains<double>& gains, const Sweep& sweep) {
+  m.couplings.up_to_closures(sweep, [&](std::size_t closure) {
+    if (m.couplings.slot_of(closure) != 0) close<kNewton>(m, closure, of, gains);
+  });
+}
+
 void factor_mass(Memory m, Slots) {
-  const auto factor = [&](const auto& rotors) {
-    with_ties(m, rotors, [&](const auto& added) {
-      articulated_inertia_up(m.model.tree, m.constants, m.work.placement, m.work.articulated, m.mass_gains(), added);
-    });
+  const auto part_up = [&](Slots part) {
+    const auto factor = [&](const auto& rotors) {
+      with_ties(m, rotors, [&](const auto& added) {
+        articulated_inertia_up(m.model.tree, m.constants, m.work.placement, part, m.work.articulated, m.mass_gains(), added);
+      });
+    };
+    m.effects ? m.effects->with_rotors(factor) : factor(NothingAdded{});
   };
-  if (m.effects) return m.effects->with_rotors(factor);
-  factor(NothingAdded{});
+  factor_to_world<false>(m, Coupled::velocities, m.mass_gains(), part_up);
 }
 
 template <bool kNewton>
@@ -39,42 +67,49 @@ void factor(Memory m, Slots part) {
         newton_factor_up(m.model.tree, m.constants, m.work.placement, m.work.motion, m.work.displacement, part, m.work.articulated,
                          m.gains(), added);
       } else {
-        articulated_inertia_up(m.model.tree, m.constants, m.work.placement, m.work.articulated, m.gains(), added);
+        articulated_inertia_up(m.model.tree, m.constants, m.work.placement, part, m.work.articulated, m.gains(), added);
       }
     });
   };
   if (m.effects) return m.effects->with_added(all);
   all(NothingAdded{});
 }
+template <bool kNewton>
+void factor_coupled(Memory m, Slots) {
+  factor_to_world<kNewton>(m, Coupled::step, m.gains(), [&](Slots part) { factor<kNewton>(m, part); });
+}
 
-void pass_up(Memory m, const Gains<double>& gains, const Field<double>& right_side) {
-  m.now.norm = impulse_pass_up(m.model.tree, m.constants, m.work.placement, gains, right_side, m.work.bias, m.work.innovation);
+void pass_up(Memory m, const Gains<double>& gains, const Field<double>& right_side, Slots part) {
+  m.now.norm += impulse_pass_up(m.model.tree, m.constants, m.work.placement, gains, right_side, part, m.work.bias, m.work.innovation);
 }
-void pass_down(Memory m, Field<double>& correction) {
-  increment_down(m.model.tree, m.constants, m.work.placement, m.work.motion, m.gains(), m.work.innovation, m.work.variation, correction);
+void pass_down(Memory m, Slots part, Field<double>& correction) {
+  increment_down<true>(m.model.tree, m.constants, m.work.placement, m.work.motion, m.gains(), m.work.innovation, part, m.work.variation, correction);
 }
-void pass_down_mass(Memory m, const Gains<double>& gains, Field<double>& correction) {
-  rate_down(m.model.tree, m.constants, m.work.placement, gains, m.work.innovation, m.work.variation, correction);
+void pass_down_mass(Memory m, const Gains<double>& gains, Slots part, Field<double>& correction) {
+  rate_down(m.model.tree, m.constants, m.work.placement, gains, m.work.innovation, part, m.work.variation, correction);
+}
+/// The same with what couplings do on the way.
+void solve_up(Memory m, Coupled of, const Gains<double>& gains, const Field<double>& right_side) {
+  m.now.norm = 0;
+  m.couplings.begin_solve(of);
+  m.couplings.up_to_closures([&](Slots part) { pass_up(m, gains, right_side, part); },
+                             [&](std::size_t closure) { m.couplings.yield(closure, m.ties, m.work.innovation, m.work.bias); });
+}
+template <class Sweep>
+void solve_down(Memory m, Coupled of, const Sweep& sweep) {
+  m.couplings.down_from_closures(sweep, [&](std::size_t closure) { m.couplings.push(closure, of, m.work.variation, m.work.innovation); });
 }
 
 /// What all joints do while a tied coordinate moves; newton: with the factor of the Jacobian, else with that of the mass matrix.
 void factor_ties(Memory m, const Gains<double>& gains, bool newton) {
+  const Slots all = all_slots(m.model.tree);
   m.ties.factor(
       [&](const Field<double>& r, Field<double>& x) {
-        pass_up(m, gains, r);
-        newton ? pass_down(m, x) : pass_down_mass(m, gains, x);
+        pass_up(m, gains, r, all);
+        newton ? pass_down(m, all, x) : pass_down_mass(m, gains, all, x);
       },
       [&](Index i) { return tied_load(m.model.tree, m.constants, gains, m.work.bias, m.work.variation, i); }, m.work.increment);
 }
-
-/// S and its factor; newton: with the factor of the Jacobian, else with that of the mass matrix.
-void factor_couplings(Memory m, Coupled of, const Gains<double>& gains, bool newton) {
-  m.couplings.factor(of, m.constants, m.work.placement, newton ? &m.work.motion : nullptr, gains, m.ties, true);
-}
-void give_way(Memory m, Coupled of, const Gains<double>& gains, Field<double, 6>* with) {
-  m.couplings.give_way(of, m.constants, m.work.placement, gains, m.ties, m.work.innovation, with);
-}
-void find_norm(Memory m) { m.now.norm = energy_norm(m.model.tree, m.work.joint_inverse, m.work.innovation); }
 
 void spread(Memory m, Slots) { spread_mimics<double>(m.ties.mimics(), m.work.delta); }
 void place(Memory m, Slots part) { placement_map(m.model.tree, m.constants, m.state.q, part, m.work.placement); }
@@ -95,7 +130,7 @@ const Array kResidual{"residual", [](Memory m) -> Field<double>& { return m.work
 const Array kDelta{"delta", [](Memory m) -> Field<double>& { return m.work.delta; }};
 
 constexpr std::string_view kTies = "ties: a tree solve for each leader", kCompletion = "ties: completion";
-constexpr std::string_view kCouplingRows = "couplings: rows, and their factor", kGiveWay = "couplings: give way";
+constexpr std::string_view kCloseAtWorld = "couplings: rows that close at the world, and their factor";
 
 /// Writes the list phase by phase.
 class Writer {
@@ -122,6 +157,9 @@ class Writer {
   }
   bool ties() const { return !draft_.model.mimics.empty(); }
   bool couplings() const { return !draft_.model.couplings.empty(); }
+  /// Whether an evaluation solves for the correction, not its first half alone.
+  bool solves_at_once() const { return ties() || couplings(); }
+  std::string coupled() const { return couplings() ? ", couplings" : ""; }
   bool springs() const { return std::ranges::any_of(draft_.model.couplings, gives_way); }
   bool newton() const { return draft_.options.solver == Solver::newton; }
   bool one_pass() const { return draft_.strategy.one_pass; }
@@ -218,25 +256,23 @@ void Writer::explicit_guess() {
 }
 
 void Writer::factor_mass_matrix(When when) {
-  add(when, "articulated_inertia_up", "inertia, screw, placement", "articulated, mass gains", factor_mass);
+  add(when, "articulated_inertia_up", "inertia, screw, placement" + coupled(), "articulated, mass gains" + coupled(), factor_mass);
   if (ties()) {
     add(when, kTies, "screw, placement, mass gains", "ties, bias, innovation, variation, increment",
         [](Memory m, Slots) { factor_ties(m, m.mass_gains(), false); });
   }
   if (!couplings()) return;
-  add(when, kCouplingRows, "screw, placement, mass gains, ties, couplings", "couplings",
-      [](Memory m, Slots) { factor_couplings(m, Coupled::velocities, m.mass_gains(), false); });
+  add(when, kCloseAtWorld, "screw, placement, mass gains, ties, couplings", "couplings",
+      [](Memory m, Slots) { close_at_world<false>(m, Coupled::velocities, m.mass_gains()); });
 }
 
 void Writer::solve_mass_matrix(When when, const Array& right_side, const Array& solution) {
-  add(when, "impulse_pass_up", "screw, placement, mass gains, " + right_side.name, "bias, innovation",
-      [of = right_side.of](Memory m, Slots) { pass_up(m, m.mass_gains(), of(m)); });
-  if (couplings()) {
-    add(when, kGiveWay, "screw, placement, mass gains, ties, couplings, innovation", "couplings, innovation",
-        [](Memory m, Slots) { give_way(m, Coupled::velocities, m.mass_gains(), nullptr); });
-  }
-  add(when, "rate_down", "screw, placement, mass gains, innovation", "variation, " + solution.name,
-      [of = solution.of](Memory m, Slots) { pass_down_mass(m, m.mass_gains(), of(m)); });
+  add(when, "impulse_pass_up", "screw, placement, mass gains" + coupled() + ", " + right_side.name, "bias, innovation" + coupled(),
+      [of = right_side.of](Memory m, Slots) { solve_up(m, Coupled::velocities, m.mass_gains(), of(m)); });
+  add(when, "rate_down", "screw, placement, mass gains, innovation" + coupled(), "variation, " + solution.name + coupled(),
+      [of = solution.of](Memory m, Slots) {
+        solve_down(m, Coupled::velocities, [&](Slots part) { pass_down_mass(m, m.mass_gains(), part, of(m)); });
+      });
   if (!ties()) return;
   add(when, kCompletion, "ties, " + solution.name, solution.name, [of = solution.of](Memory m, Slots) { m.ties.complete(of(m)); });
 }
@@ -264,9 +300,11 @@ void Writer::evaluation() {
   if (draft_.plan.bodies) added += ", body impulses";
   if (newton()) {
     const std::string reads = "inertia, screw, placement, motion, displacement" + added;
-    add(When::factor, "newton_factor_up", reads, "articulated, gains", factor<true>, Way::up);
+    add(When::factor, "newton_factor_up", reads + coupled(), "articulated, gains" + coupled(), couplings() ? factor_coupled<true> : factor<true>,
+        couplings() ? Way::whole : Way::up);
   } else {
-    add(When::factor, "articulated_inertia_up", "inertia, screw, placement" + added, "articulated, gains", factor<false>);
+    add(When::factor, "articulated_inertia_up", "inertia, screw, placement" + added + coupled(), "articulated, gains" + coupled(),
+        couplings() ? factor_coupled<false> : factor<false>);
   }
   if (ties()) {
     add(When::factor, kTies, newton() ? "screw, placement, motion, gains" : "screw, placement, gains",
@@ -274,18 +312,14 @@ void Writer::evaluation() {
         [newton = newton()](Memory m, Slots) { factor_ties(m, m.gains(), newton); });
   }
   if (couplings()) {
-    add(When::factor, kCouplingRows, newton() ? "screw, placement, motion, gains, ties, couplings" : "screw, placement, gains, ties, couplings", "couplings",
-        [newton = newton()](Memory m, Slots) { factor_couplings(m, Coupled::step, m.gains(), newton); });
+    add(When::factor, kCloseAtWorld, newton() ? "screw, placement, motion, gains, ties, couplings" : "screw, placement, gains, ties, couplings", "couplings",
+        [newton = newton()](Memory m, Slots) {
+          newton ? close_at_world<true>(m, Coupled::step, m.gains()) : close_at_world<false>(m, Coupled::step, m.gains());
+        });
   }
   if (!one_pass()) return residual_by_itself();
   add(When::evaluation, "innovation_up", "screw, placement, gains, impulse, momentum_target", "impulse, innovation",
       [](Memory m, Slots part) { m.now.norm += innovation_up(m.model.tree, m.constants, part, m.work); }, Way::up).sums = true;
-  if (couplings()) {
-    add(When::evaluation, kGiveWay, "screw, placement, gains, couplings, impulse, innovation", "couplings, impulse, innovation", [](Memory m, Slots) {
-      give_way(m, Coupled::step, m.gains(), &m.work.impulse);
-      find_norm(m);
-    });
-  }
   if (!draft_.strategy.finds_end_momenta()) return;
   add(When::evaluation, "momentum_at_end_map", "screw, displacement, impulse, innovation", "end_momentum", [](Memory m, Slots part) {
     if (!m.finds_end_momenta) return;
@@ -293,7 +327,7 @@ void Writer::evaluation() {
   }, Way::up);
 }
 
-/// The residual, and the first half of a solve after it. Ties between joints make the whole solve necessary for the norm.
+/// The residual, and the first half of a solve after it. What ties joints, or bodies, makes the whole solve necessary for the norm.
 void Writer::residual_by_itself() {
   add(When::evaluation, "residual_up", "screw, placement, impulse, momentum_target", "impulse, residual", [](Memory m, Slots) {
     m.now.plain = residual_up(m.model.tree, m.constants, m.work.placement, m.work.momentum_target, m.work.impulse, m.work.residual);
@@ -301,29 +335,27 @@ void Writer::residual_by_itself() {
   if (ties()) {
     add(When::evaluation, "fold_mimics", "residual", "residual", [](Memory m, Slots) { fold_mimics(m.ties.mimics(), m.work.residual); });
   }
-  add(When::evaluation, "impulse_pass_up", "screw, placement, gains, residual", "bias, innovation",
-      [](Memory m, Slots) { pass_up(m, m.gains(), m.work.residual); });
+  add(When::evaluation, "impulse_pass_up", "screw, placement, gains, residual" + coupled(), "bias, innovation" + coupled(),
+      [](Memory m, Slots) { solve_up(m, Coupled::step, m.gains(), m.work.residual); });
+  if (!solves_at_once()) return;
+  if (newton()) {
+    add(When::evaluation, "increment_down", "screw, placement, motion, gains, innovation" + coupled(), "variation, increment" + coupled(),
+        [](Memory m, Slots) { solve_down(m, Coupled::step, [&](Slots part) { pass_down(m, part, m.work.increment); }); });
+  } else {
+    add(When::evaluation, "rate_down", "screw, placement, gains, innovation" + coupled(), "variation, increment" + coupled(),
+        [](Memory m, Slots) { solve_down(m, Coupled::step, [&](Slots part) { pass_down_mass(m, m.gains(), part, m.work.increment); }); });
+  }
+  if (ties()) add(When::evaluation, kCompletion, "ties, increment", "increment", [](Memory m, Slots) { m.ties.complete(m.work.increment); });
   if (couplings()) {
-    add(When::evaluation, kGiveWay, "screw, placement, gains, ties, couplings, residual, innovation", "couplings, residual, innovation", [](Memory m, Slots) {
-      give_way(m, Coupled::step, m.gains(), nullptr);
-      find_norm(m);
+    add(When::evaluation, "couplings: what they push leaves the residual", "couplings, residual", "residual", [](Memory m, Slots) {
       m.couplings.subtract_push(m.work.residual);
       fold_mimics(m.ties.mimics(), m.work.residual);
     });
   }
-  if (!ties()) return;
-  if (newton()) {
-    add(When::evaluation, "increment_down", "screw, placement, motion, gains, innovation", "variation, increment",
-        [](Memory m, Slots) { pass_down(m, m.work.increment); });
-  } else {
-    add(When::evaluation, "rate_down", "screw, placement, gains, innovation", "variation, increment",
-        [](Memory m, Slots) { pass_down_mass(m, m.gains(), m.work.increment); });
-  }
-  add(When::evaluation, kCompletion, "ties, residual, increment", "increment", [](Memory m, Slots) {
-    m.ties.complete(m.work.increment);
-    double tied = 0;
-    for (Index row = 0; row < m.work.residual.rows(); ++row) tied += m.work.residual(row) * m.work.increment(row);
-    m.now.norm = std::abs(tied);
+  add(When::evaluation, "norm of the residual", "residual, increment", "", [](Memory m, Slots) {
+    double sum = 0;
+    for (Index row = 0; row < m.work.residual.rows(); ++row) sum += m.work.residual(row) * m.work.increment(row);
+    m.now.norm = std::abs(sum);
   });
 }
 
@@ -340,15 +372,15 @@ void Writer::correction() {
       increment_down(m.model.tree, m.constants, m.work.placement, m.work.motion, m.gains(), m.work.innovation, part, m.work.variation,
                      m.work.applied);
     }, Way::down);
-  } else if (ties()) {
+  } else if (solves_at_once()) {
     add(When::correction, "swap_corrections", "increment, applied", "increment, applied",
         [](Memory m, Slots) { std::ranges::swap_ranges(m.work.increment.flat(), m.work.applied.flat()); });
   } else if (newton()) {
     add(When::correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, applied",
-        [](Memory m, Slots) { pass_down(m, m.work.applied); });
+        [](Memory m, Slots part) { pass_down(m, part, m.work.applied); });
   } else {
     add(When::correction, "rate_down", "screw, placement, gains, innovation", "variation, applied",
-        [](Memory m, Slots) { pass_down_mass(m, m.gains(), m.work.applied); });
+        [](Memory m, Slots part) { pass_down_mass(m, m.gains(), part, m.work.applied); });
   }
   add(When::correction, "correct_motion_map", "screw, applied, delta, motion", "delta, motion", [](Memory m, Slots part) {
     correct_motion_map(m.model.tree, m.constants, m.work.applied, m.share, part, m.work.delta, m.work.motion);

@@ -26,11 +26,10 @@ bool is_long_chain(const Tree& tree) {
 Strategy strategy_of(const Model& model, const Options& options, const EffectPlan& plan) {
   Strategy strategy;
   strategy.gravity = options.gravity != std::array<double, 3>{0, 0, 0};
-  strategy.one_pass = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty();
-  const bool coupled = !model.couplings.empty();
+  strategy.one_pass = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && model.couplings.empty();
   strategy.reuses_factor =
-      strategy.one_pass && !coupled && options.order == 2 && options.guess == FirstGuess::extrapolation && !plan.has_states;
-  if (plan.any() || !strategy.one_pass || coupled) return strategy;
+      strategy.one_pass && options.order == 2 && options.guess == FirstGuess::extrapolation && !plan.has_states;
+  if (plan.any() || !strategy.one_pass) return strategy;
   strategy.order = Order::branches;
   if (options.order != 2) return strategy;
   if (is_long_chain(model.tree)) strategy.order = Order::long_chain;

@@ -60,8 +60,8 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::close_velocities(Field<double>& v) {
   if (couplings_.empty()) return;
   factor_for_start(Coupled::velocities);
-  std::ranges::fill(work_.innovation.flat(), 0.0);
-  complete_rates(Coupled::velocities, work_.increment, &v);
+  std::ranges::fill(work_.residual.flat(), 0.0);
+  apply_mass_inverse(work_.residual, work_.increment, &v);
   for (Index row = 0; row < v.rows(); ++row) v(row) += work_.increment(row);
 }
 
@@ -69,8 +69,8 @@ void TreeSweeps<kEffects>::close_velocities(Field<double>& v) {
 template <bool kEffects>
 void TreeSweeps<kEffects>::close_gaps(double damping, Field<double>& q) {
   factor_for_start(Coupled::positions, damping);
-  std::ranges::fill(work_.innovation.flat(), 0.0);
-  complete_rates(Coupled::positions, work_.increment);
+  std::ranges::fill(work_.residual.flat(), 0.0);
+  apply_mass_inverse(work_.residual, work_.increment, nullptr, Coupled::positions);
   double most = 0;
   down(model_.tree, [&](auto joint, Index i) {
     const Index row = model_.tree.first_v(i);

@@ -15,76 +15,79 @@ void TreeSweeps<kEffects>::with_ties(const Added& added, const Action& action) {
   action(ties_.held(added));
 }
 
-/// Where joints are tied, what becomes of a factor with them held. down(x): the second half of a solve.
+/// Where joints are tied, what becomes of a factor of all joints with them held. down(x): the second half of a solve.
 template <bool kEffects>
 template <class Down>
 void TreeSweeps<kEffects>::tie(const Gains<double>& gains, const Down& down) {
   if (ties_.empty()) return;
   const auto solve = [&](const Field<double>& r, Field<double>& x) {
-    impulse_pass_up(model_.tree, *constants_, work_.placement, gains, r, work_.bias, work_.innovation);
+    impulse_pass_up(model_.tree, *constants_, work_.placement, gains, r, all_slots(model_.tree), work_.bias, work_.innovation);
     down(x);
   };
   ties_.factor(solve, [&](Index i) { return tied_load(model_.tree, *constants_, gains, work_.bias, work_.variation, i); }, work_.increment);
 }
 
+/// What the body feels where couplings close, of the factor of a step or, with rates, of the mass matrix.
 template <bool kEffects>
-void TreeSweeps<kEffects>::factor_couplings(Coupled of, const Gains<double>& gains, double damping) {
+void TreeSweeps<kEffects>::close(std::size_t closure, Coupled of, const Gains<double>& gains, double damping) {
   const bool increments = of == Coupled::step && options_.solver == Solver::newton;
-  couplings_.factor(of, *constants_, work_.placement, increments ? &work_.motion : nullptr, gains, ties_, true, damping);
+  const std::array<double, 36> felt =
+      couplings_.close(closure, of, *constants_, work_.placement, increments ? &work_.motion : nullptr, gains, ties_, true, damping);
+  const Index slot = couplings_.slot_of(closure);
+  if (slot == 0) return;
+  if (increments) {
+    add_inertia(model_.tree, all_slots(model_.tree), slot, felt, work_.articulated);
+  } else {
+    add_inertia(slot, felt, work_.articulated);
+  }
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::factor() {
-  effects_.with_added([&](const auto& given) {
-    with_ties(given, [&](const auto& added) {
-      if (options_.solver == Solver::riqn) {
-        articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, gains(), added);
-      } else {
-        newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, work_.articulated, gains(),
-                         added);
-      }
+  const auto part_up = [&](Slots part) {
+    effects_.with_added([&](const auto& given) {
+      with_ties(given, [&](const auto& added) {
+        if (options_.solver == Solver::riqn) {
+          articulated_inertia_up(model_.tree, *constants_, work_.placement, part, work_.articulated, gains(), added);
+        } else {
+          newton_factor_up(model_.tree, *constants_, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains(), added);
+        }
+      });
     });
-  });
-  const auto down = [&](Field<double>& x) {
-    if (options_.solver == Solver::riqn) {
-      rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, x);
-    } else {
-      increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, x);
-    }
+    tie(gains(), [&](Field<double>& x) { increments_down(part, x); });
   };
-  tie(gains(), down);
-  factor_couplings(Coupled::step, gains());
+  couplings_.up_to_closures(part_up, [&](std::size_t closure) { close(closure, Coupled::step, gains()); });
 }
 
 template <bool kEffects>
 double TreeSweeps<kEffects>::pass_residual() {
-  double norm = impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, work_.bias, work_.innovation);
+  couplings_.begin_solve(Coupled::step);
+  double norm = 0;
+  couplings_.up_to_closures(
+      [&](Slots part) { norm += impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, part, work_.bias, work_.innovation); },
+      [&](std::size_t closure) { couplings_.yield(closure, ties_, work_.innovation, work_.bias); });
+  if (!solves_with_residual()) return norm;
+  pass_down(work_.increment);
   if (!couplings_.empty()) {
-    norm = give_way(nullptr);
     couplings_.subtract_push(work_.residual);
     fold_mimics(ties_.mimics(), work_.residual);
   }
-  if (!solves_with_residual()) return norm;
-  pass_down(work_.increment);
-  double tied = 0;
-  for (Index row = 0; row < model_.tree.shape.velocities; ++row) tied += work_.residual(row) * work_.increment(row);
-  return std::abs(tied);
+  return std::abs(along(work_.increment));
 }
 
-/// Between the halves of a solve of a step; returns the norm of what is left.
 template <bool kEffects>
-double TreeSweeps<kEffects>::give_way(Field<double, 6>* with) {
-  couplings_.give_way(Coupled::step, *constants_, work_.placement, gains(), ties_, work_.innovation, with);
-  return energy_norm(model_.tree, work_.joint_inverse, work_.innovation);
+void TreeSweeps<kEffects>::increments_down(Slots part, Field<double>& x) {
+  if (options_.solver == Solver::riqn) {
+    rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, part, work_.variation, x);
+  } else {
+    increment_down<true>(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, part, work_.variation, x);
+  }
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::pass_down(Field<double>& correction) {
-  if (options_.solver == Solver::riqn) {
-    rate_down(model_.tree, *constants_, work_.placement, gains(), work_.innovation, work_.variation, correction);
-  } else {
-    increment_down(model_.tree, *constants_, work_.placement, work_.motion, gains(), work_.innovation, work_.variation, correction);
-  }
+  couplings_.down_from_closures([&](Slots part) { increments_down(part, correction); },
+                                [&](std::size_t closure) { couplings_.push(closure, Coupled::step, work_.variation, work_.innovation); });
   if (!ties_.empty()) ties_.complete(correction);
 }
 
@@ -92,11 +95,13 @@ template <bool kEffects>
 template <class Added>
 void TreeSweeps<kEffects>::factor_mass(const Added& added, Coupled of, double damping) {
   place_all();
-  with_ties(added, [&](const auto& all) {
-    articulated_inertia_up(model_.tree, *constants_, work_.placement, work_.articulated, mass_gains(), all);
-  });
-  tie(mass_gains(), [&](Field<double>& x) { rates(x); });
-  factor_couplings(of, mass_gains(), damping);
+  const auto part_up = [&](Slots part) {
+    with_ties(added, [&](const auto& all) {
+      articulated_inertia_up(model_.tree, *constants_, work_.placement, part, work_.articulated, mass_gains(), all);
+    });
+    tie(mass_gains(), [&](Field<double>& x) { rates_down(part, x); });
+  };
+  couplings_.up_to_closures(part_up, [&](std::size_t closure) { close(closure, of, mass_gains(), damping); });
 }
 
 /// Of positions or velocities that are to close couplings; joints whose motion is given keep theirs.
@@ -112,22 +117,19 @@ void TreeSweeps<kEffects>::factor_for_start(Coupled of, double damping) {
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::rates(Field<double>& v) {
-  rate_down(model_.tree, *constants_, work_.placement, mass_gains(), work_.innovation, work_.variation, v);
-}
-
-/// What couplings make of the first half of a solve with the mass matrix, and its second half.
-template <bool kEffects>
-void TreeSweeps<kEffects>::complete_rates(Coupled of, Field<double>& v, const Field<double>* given) {
-  couplings_.give_way(of, *constants_, work_.placement, mass_gains(), ties_, work_.innovation, nullptr, given);
-  rates(v);
-  if (!ties_.empty()) ties_.complete(v);
+void TreeSweeps<kEffects>::rates_down(Slots part, Field<double>& v) {
+  rate_down(model_.tree, *constants_, work_.placement, mass_gains(), work_.innovation, part, work_.variation, v);
 }
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given, Coupled of) {
-  impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, work_.bias, work_.innovation);
-  complete_rates(of, v, given);
+  couplings_.begin_solve(of, given);
+  couplings_.up_to_closures(
+      [&](Slots part) { impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, part, work_.bias, work_.innovation); },
+      [&](std::size_t closure) { couplings_.yield(closure, ties_, work_.innovation, work_.bias); });
+  couplings_.down_from_closures([&](Slots part) { rates_down(part, v); },
+                                [&](std::size_t closure) { couplings_.push(closure, of, work_.variation, work_.innovation); });
+  if (!ties_.empty()) ties_.complete(v);
 }
 
 template <bool kEffects>

@@ -41,13 +41,13 @@ using Numbers = Field<double, Components>;
   PREFIX void impulse_up(const Tree&, const BodyNumbers&, const Numbers<12>&, Numbers<6>&, Numbers<>&);                                    \
   PREFIX double residual_up(const Tree&, const BodyNumbers&, const Numbers<12>&, const Numbers<>&, Numbers<6>&, Numbers<>&);               \
   PREFIX double innovation_up(const Tree&, const BodyNumbers&, Slots, Workspace<double>&);                                                 \
-  PREFIX double impulse_pass_up(const Tree&, const BodyNumbers&, const Numbers<12>&, const Gains<double>&, const Numbers<>&, Numbers<6>&,  \
-                                Numbers<>&);                                                                                               \
+  PREFIX double impulse_pass_up(const Tree&, const BodyNumbers&, const Numbers<12>&, const Gains<double>&, const Numbers<>&, Slots,        \
+                                Numbers<6>&, Numbers<>&);                                                                                  \
   PREFIX void increment_down<false>(const Tree&, const BodyNumbers&, const Numbers<12>&, const Numbers<7>&, const Gains<double>&,          \
                                     const Numbers<>&, Slots, Numbers<6>&, Numbers<>&);                                                     \
-  PREFIX void increment_down(const Tree&, const BodyNumbers&, const Numbers<12>&, const Numbers<7>&, const Gains<double>&,                 \
-                             const Numbers<>&, Numbers<6>&, Numbers<>&);                                                                   \
-  PREFIX void rate_down(const Tree&, const BodyNumbers&, const Numbers<12>&, const Gains<double>&, const Numbers<>&, Numbers<6>&,          \
+  PREFIX void increment_down<true>(const Tree&, const BodyNumbers&, const Numbers<12>&, const Numbers<7>&, const Gains<double>&,           \
+                                   const Numbers<>&, Slots, Numbers<6>&, Numbers<>&);                                                      \
+  PREFIX void rate_down(const Tree&, const BodyNumbers&, const Numbers<12>&, const Gains<double>&, const Numbers<>&, Slots, Numbers<6>&,   \
                         Numbers<>&);                                                                                                       \
   PREFIX void advance_map(const Tree&, const Numbers<7>&, const Numbers<>&, Slots, Numbers<>&);                                            \
   PREFIX void gravity_field_down(const Tree&, const Numbers<12>&, const Vec3<double>&, Slots, Numbers<3>&);                                \
@@ -63,8 +63,8 @@ using Numbers = Field<double, Components>;
 #define LINDEN_TREE_FACTORS(PREFIX, ADDED)                                                                                                 \
   PREFIX void newton_factor_up(const Tree&, const BodyNumbers&, const Numbers<12>&, const Numbers<7>&, const Numbers<7>&, Slots,           \
                                Numbers<kRowNumbers>&, const Gains<double>&, const ADDED&);                                                 \
-  PREFIX void articulated_inertia_up(const Tree&, const BodyNumbers&, const Numbers<12>&, Numbers<kRowNumbers>&, const Gains<double>&,     \
-                                     const ADDED&)
+  PREFIX void articulated_inertia_up(const Tree&, const BodyNumbers&, const Numbers<12>&, Slots, Numbers<kRowNumbers>&,                    \
+                                     const Gains<double>&, const ADDED&)
 
 using JointsAdded = EffectsAdded<double, true, false>;
 using BodiesAdded = EffectsAdded<double, false, true>;

@@ -49,7 +49,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
     move(part, sum);
     momenta(part, sum);
   };
-  if (!kEffects && strategy_.one_pass && couplings_.empty()) {
+  if (!kEffects && strategy_.one_pass) {
     valid_.evaluation = !strategy_.shares_rows;
     valid_.end_momenta = factor == Factor::kept && strategy_.finds_end_momenta();
     valid_.placements = !strategy_.shares_rows;
@@ -150,9 +150,6 @@ void TreeSweeps<kEffects>::pass_up(Evaluated<double>& now, Factor how) {
     effects_.with_added([&](const auto& added) {
       in_parts_up(all_slots(model_.tree), [&](Slots part) { now.norm += pass_part(part, how, added); });
     });
-    if (couplings_.empty()) return;
-    if (how == Factor::fresh) factor_couplings(Coupled::step, gains());
-    now.norm = give_way(&work_.impulse);
     return;
   }
   if (how == Factor::fresh) factor();
@@ -167,6 +164,7 @@ void TreeSweeps<kEffects>::factor_again(Evaluated<double>& now, StepReport& repo
   valid_.end_momenta = false;
   report.factorisations += 1;
   if (!strategy_.one_pass) {
+    if (!couplings_.empty()) couplings_.add_push(work_.residual);
     factor();
     now.norm = pass_residual();
     return;

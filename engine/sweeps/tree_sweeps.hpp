@@ -106,7 +106,7 @@ class TreeSweeps {
   /// The evaluation after the correction applied last, times `factor`.
   Evaluated<double> correct(double factor, StepReport& report);
 
-  /// The residual of each joint as its solve left it [kg m^2, kg m]; with no ties, the innovation.
+  /// The residual of each joint as its solve left it [kg m^2, kg m]; with no ties and couplings, the innovation.
   Field<double>& joint_residual() { return strategy_.one_pass ? work_.innovation : work_.residual; }
   const Field<double>& joint_residual() const { return strategy_.one_pass ? work_.innovation : work_.residual; }
   /// d^-1 of each joint, of one that is tied that of its coordinate: how far an impulse moves it.
@@ -196,25 +196,24 @@ class TreeSweeps {
   void factor();
   template <class Added>
   void factor_mass(const Added& added, Coupled of = Coupled::velocities, double damping = 0);
-  void rates(Field<double>& v);
-  void complete_rates(Coupled of, Field<double>& v, const Field<double>* given = nullptr);
+  void rates_down(Slots part, Field<double>& v);
   void factor_for_start(Coupled of, double damping = 0);
   bool is_closed_to(double enough) const;
   void close_gaps(double damping, Field<double>& q);
   template <class Added, class Action>
   void with_ties(const Added& added, const Action& action);
-  void factor_couplings(Coupled of, const Gains<double>& gains, double damping = 0);
-  double give_way(Field<double, 6>* with);
+  void close(std::size_t closure, Coupled of, const Gains<double>& gains, double damping = 0);
   void take_multipliers();
   template <class Down>
   void tie(const Gains<double>& gains, const Down& down);
   double pass_residual();
+  void increments_down(Slots part, Field<double>& x);
   void pass_down(Field<double>& correction);
   double momenta_of_delta(Field<double>& momenta);
   double slope_along(const Field<double>& innovation_before) const;
   double along(const Field<double>& correction) const;
-  /// What ties joints makes the whole solve necessary for the norm.
-  bool solves_with_residual() const { return !ties_.empty(); }
+  /// What ties joints, or bodies, makes the whole solve necessary for the norm.
+  bool solves_with_residual() const { return !ties_.empty() || !couplings_.empty(); }
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
   Gains<double> mass_gains() { return strategy_.reuses_factor ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }

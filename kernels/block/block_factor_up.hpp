@@ -6,6 +6,7 @@
 //
 // reads   screw 2 x n, inertia 10 x n, placement 12 x n, motion 7 x n (of a screw's only z, w and shift), turn 3 x n or displacement 7 x n
 // writes  articulated 36 x n (the children's share of Pi), gains
+// slots   all, or parts of them in the order of a way up
 // source  see newton_factor_up.hpp
 #pragma once
 
@@ -19,9 +20,9 @@ namespace linden {
 enum class Jacobian : std::uint8_t { first_order, exact };
 
 template <class S, class Element, class Added = NothingAdded>
-[[gnu::noinline]] void block_factor_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work, const Gains<S>& gains,
-                                       Jacobian jacobian, const Added& added = {}) {
-  up(tree, [&](auto joint, Index i) {
+[[gnu::noinline]] void block_factor_up(const Tree& tree, const BodyConstants<Element>& constants, Slots slots, Workspace<S>& work,
+                                       const Gains<S>& gains, Jacobian jacobian, const Added& added = {}) {
+  up(tree, slots, [&](auto joint, Index i) {
     const auto G = load<Inertia, S>(constants.inertia, i);
     Mat6<S> A;
     if (jacobian == Jacobian::first_order) {
@@ -52,6 +53,12 @@ template <class S, class Element, class Added = NothingAdded>
     }
     spill_here();
   });
+}
+
+template <class S, class Element, class Added = NothingAdded>
+void block_factor_up(const Tree& tree, const BodyConstants<Element>& constants, Workspace<S>& work, const Gains<S>& gains, Jacobian jacobian,
+                     const Added& added = {}) {
+  block_factor_up(tree, constants, all_slots(tree), work, gains, jacobian, added);
 }
 
 }  // namespace linden

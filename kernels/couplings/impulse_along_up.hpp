@@ -7,8 +7,9 @@
 // which  J A^-1 r = y.(d^-1 u),  y the row and u what is left of r. So J A^-1 G^T takes two sweeps over a path and no tree solve.
 //
 // reads   screw 2 x n, placements, gain 6 x nv, given(joint, k): r of joint slots[k]
-// writes  take(joint, k, b, u) for each of them; bias 6 x n, of their rows alone
-// slots   leaves first; each joint's parent is there too, or is the world
+// writes  take(joint, k, u) for each of them; bias 6 x n, of their rows alone and that of `top`
+// slots   leaves first; each joint's parent is there too, or is `top`, 0: the world
+// met     met(slot) before the joint of a body is gone through, when all that comes to its bias from below has come
 // source  see impulse_pass_up.hpp; Featherstone, Rigid Body Dynamics Algorithms, 8.5 (loops within a tree's solve)
 #pragma once
 
@@ -18,17 +19,19 @@
 
 namespace linden {
 
-template <class S, class Element, class PlacementOf, class Given, class Take>
+template <class S, class Element, class PlacementOf, class Met, class Given, class Take>
 void impulse_along_up(const Tree& tree, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Field<S, 6>& gain,
-                      std::span<const Index> slots, const Given& given, const Take& take, Field<S, 6>& bias) {
+                      std::span<const Index> slots, Index top, const Met& met, const Given& given, const Take& take, Field<S, 6>& bias) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
   for (const Index i : slots) store(bias, i, Wrench<S>{zero, zero});
+  store(bias, top, Wrench<S>{zero, zero});
   for (std::size_t k = 0; k < slots.size(); ++k) {
     const Index i = slots[k];
+    met(i);
     with_joint(tree.kind(i), [&](auto joint) {
       const auto b = load<Wrench, S>(bias, i);
       const Wrench<S> u = given(joint, k) - project(joint, constants, i, b);
-      take(joint, k, b, u);
+      take(joint, k, u);
       const Index parent = tree.parent(i), row = tree.first_v(i);
       if (parent == 0) return;
       Wrench<S> passed = b + u;

@@ -7,6 +7,7 @@
 // writes  bias 6 x n (b), innovation nv (u)
 // returns sum of |u.(d^-1 u)| = r.(A^-1 r) for a symmetric positive factor: the squared energy norm of r. The exact Jacobian differs
 //         from h^-1 M by O(h), and far from the solution its d may even be negative, hence the absolute value
+// slots   all, or parts of them in the order of a way up
 // cost    one pass
 // source  Featherstone, Rigid Body Dynamics Algorithms, 7.3, pass 2, for impulses
 #pragma once
@@ -28,6 +29,24 @@ LINDEN_INLINE Wrench<S> apply_inverse(Joint<Kind>, const Field<S>& inverse, Inde
     for (Index r = 0; r < n; ++r) {
       out[r] = inverse(block + n * r) * in[0];
       for (Index c = 1; c < n; ++c) out[r] = out[r] + inverse(block + n * r + c) * in[c];
+    }
+    return Wrench<S>::from(out);
+  }
+}
+
+/// d^-T y
+template <JointKind Kind, class S>
+LINDEN_INLINE Wrench<S> apply_inverse_transposed(Joint<Kind>, const Field<S>& inverse, Index block, const Wrench<S>& y) {
+  if constexpr (Kind == JointKind::screw) {
+    return {{inverse(block) * y.n.x, S(0.0), S(0.0)}, y.f};
+  } else {
+    constexpr Index n = velocity_count(Kind);
+    S in[6], out[6];
+    y.to(in);
+    y.to(out);
+    for (Index c = 0; c < n; ++c) {
+      out[c] = inverse(block + c) * in[0];
+      for (Index r = 1; r < n; ++r) out[c] = out[c] + inverse(block + n * r + c) * in[r];
     }
     return Wrench<S>::from(out);
   }
@@ -68,11 +87,11 @@ S energy_norm(const Tree& tree, const Field<S>& inverse, const Field<S>& innovat
 
 template <class S, class Element>
 S impulse_pass_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
-                  const Field<S>& residual, Field<S, 6>& bias, Field<S>& innovation) {
+                  const Field<S>& residual, Slots slots, Field<S, 6>& bias, Field<S>& innovation) {
   const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-  for (Index i = 0; i < tree.shape.slots; ++i) store(bias, i, Wrench<S>{zero, zero});
+  for (Index i = 0; slots.end == tree.shape.slots && i < slots.end; ++i) store(bias, i, Wrench<S>{zero, zero});
   S norm(0.0);
-  up(tree, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
+  up(tree, slots, [&](auto joint, Index i) LINDEN_INLINE_LAMBDA {
     const Index row = tree.first_v(i);
     const auto b = load<Wrench, S>(bias, i);
     const Wrench<S> u = load_joint(joint, residual, row) - project(joint, constants, i, b);
@@ -82,6 +101,12 @@ S impulse_pass_up(const Tree& tree, const BodyConstants<Element>& constants, con
     store(bias, parent, load<Wrench, S>(bias, parent) + to_parent(load<Placement, S>(placement, i), passed));
   });
   return norm;
+}
+
+template <class S, class Element>
+S impulse_pass_up(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
+                  const Field<S>& residual, Field<S, 6>& bias, Field<S>& innovation) {
+  return impulse_pass_up(tree, constants, placement, gains, residual, all_slots(tree), bias, innovation);
 }
 
 }  // namespace linden

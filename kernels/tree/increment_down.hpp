@@ -99,9 +99,15 @@ void increment_down(const Tree& tree, const BodyConstants<Element>& constants, c
 
 template <class S, class Element>
 void rate_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
-               const Field<S>& innovation, Field<S, 6>& variation, Field<S>& rate) {
+               const Field<S>& innovation, Slots slots, Field<S, 6>& variation, Field<S>& rate) {
   const auto placement_of = [&](auto, auto bodies, Index i) LINDEN_INLINE_LAMBDA { return gather<Placement>(bodies, placement, i); };
-  yield_down<true>(tree, constants, placement_of, gains, innovation, all_slots(tree), variation, rate);
+  yield_down<true>(tree, constants, placement_of, gains, innovation, slots, variation, rate);
+}
+
+template <class S, class Element>
+void rate_down(const Tree& tree, const BodyConstants<Element>& constants, const Field<S, 12>& placement, const Gains<S>& gains,
+               const Field<S>& innovation, Field<S, 6>& variation, Field<S>& rate) {
+  rate_down(tree, constants, placement, gains, innovation, all_slots(tree), variation, rate);
 }
 
 }  // namespace linden

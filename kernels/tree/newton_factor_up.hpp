@@ -214,4 +214,14 @@ void newton_factor_up(const Tree& tree, const BodyConstants<double>& constants, 
   newton_factor_up(tree, constants, placement, motion, displacement, all_slots(tree), articulated, gains, added);
 }
 
+/// What a body feels beside its own inertia and that of bodies beyond, where slots of a part begin after it: once those have been met, and it has
+/// not. It has children. felt: as Mat6 has it.
+inline void add_inertia(const Tree& tree, Slots slots, Index i, const std::array<double, 36>& felt, Field<double, kRowNumbers>& articulated) {
+  double* const kept = articulated.row(tree.pending_row(slots, i));
+  const bool by_columns = tree.level(i) % 2 != 0;
+  for (int line = 0; line < 6; ++line) {
+    for (int k = 0; k < 6; ++k) kept[8 * line + k] += felt[static_cast<std::size_t>(by_columns ? row_start(k) + column_start(line) : row_start(line) + column_start(k))];
+  }
+}
+
 }  // namespace linden

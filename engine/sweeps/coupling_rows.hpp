@@ -1,0 +1,190 @@
+// Rows of couplings where bodies are: gaps, and how joints change them.
+//
+//   place       q^k: where bodies are, G on the paths
+//   find_gaps   q^k+1 of a displacement: gaps, J on the paths
+//
+// A row is scaled by how far it would move were its bodies free: metres and radians are alike then, and so are rows that others hold already.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "engine/sweeps/coupling_paths.hpp"
+#include "kernels/couplings/gap_map.hpp"
+#include "layout/model.hpp"
+
+namespace linden {
+
+template <class S>
+class CouplingRows {
+ public:
+  CouplingRows(const Model& model, Closing closing) : model_(model), paths_(model, closing) {
+    if (empty()) return;
+    pose_.allocate(model.tree.shape.slots);
+    for (std::vector<S>* each : {&gap_, &size_, &scale_}) each->assign(count(), S(0.0));
+    for (std::vector<S>* each : {&begin_, &end_}) each->assign(paths_.velocities(), S(0.0));
+    for (const CouplingPath& path : paths_.all()) {
+      for (const auto& term : path.coupling->terms) at_start_.push_back(as<S>(term.ratio));
+      for (std::size_t row = 0; row < path.rows(); ++row) {
+        const GapKind kind = rows_of(path.coupling->kind)[row].kind;
+        size_[path.first_row + row] = as<S>(kind == GapKind::product || kind == GapKind::sum ? 1.0 : path.length);
+      }
+    }
+  }
+
+  bool empty() const { return paths_.empty(); }
+  std::size_t count() const { return paths_.rows(); }
+  const CouplingPaths& paths() const { return paths_; }
+  bool is_rigid(std::size_t row) const { return paths_.is_rigid(row); }
+
+  /// Bodies at q^k, where the tree's placements are; gears by their coordinates.
+  void place(const Field<S, 12>& placement, const Field<S>& q) {
+    const S zero(0.0), one(1.0);
+    store(pose_, 0, Placement<S>{{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}}, {zero, zero, zero}});
+    for (auto slot = paths_.reached().rbegin(); slot != paths_.reached().rend(); ++slot) {
+      store(pose_, *slot, placed_in(load<Placement, S>(pose_, model_.tree.parent(*slot)), load<Placement, S>(placement, *slot)));
+    }
+    for (std::size_t term = 0; const CouplingPath& path : paths_.all()) {
+      for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
+    }
+    look([&](Index slot) { return load<Placement, S>(pose_, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
+  }
+  /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
+  void keep_scales(bool keep) { keeps_scales_ = keep; }
+
+  /// Gaps at the end of a displacement, and how joints change them there.
+  void find_gaps(const Field<S, 7>& displacement, const Field<S>& delta) {
+    look([&](Index slot) { return moved_by(load<Placement, S>(pose_, slot), load<Displacement, S>(displacement, slot)); },
+         [&](Index row) { return delta(row); }, end_, false);
+  }
+
+
+  /// Of each row [m], or without a unit; by what it is judged; 1 / root of how far it would move were its bodies free.
+  const std::vector<S>& gaps() const { return gap_; }
+  const std::vector<S>& sizes() const { return size_; }
+  const std::vector<S>& scales() const { return scale_; }
+  /// G at q^k, J at q^k+1: of each row what every velocity of its path does.
+  const std::vector<S>& at_begin() const { return begin_; }
+  const std::vector<S>& at_end() const { return end_; }
+
+  /// Sum of the squares of all gaps of rigid rows, each over the root of how far its row would move were its bodies free.
+  S openness() const {
+    S sum(0.0);
+    for (std::size_t j = 0; j < gap_.size(); ++j) {
+      if (is_rigid(j)) sum = sum + (scale_[j] * gap_[j]) * (scale_[j] * gap_[j]);
+    }
+    return sum;
+  }
+
+  /// Of the rigid row that is farthest open beside the size of its mechanism.
+  S widest_gap() const {
+    using std::abs, std::max;
+    S widest(0.0);
+    for (std::size_t j = 0; j < gap_.size(); ++j) {
+      if (is_rigid(j)) widest = max(widest, abs(gap_[j]) / size_[j]);
+    }
+    return widest;
+  }
+
+  /// G v of a row.
+  S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const {
+    const S* g = &begin_[path.first_velocity + (row - path.first_row) * path.velocities];
+    S sum(0.0);
+    each_on_path(path, [&](Index at_v, std::size_t at_row) { sum = sum + g[at_row] * v(at_v); });
+    return sum;
+  }
+
+  /// visit(velocity row, where it is among the path's) of joints that move the bodies of a coupling against each other.
+  template <class Visit>
+  void each_on_path(const CouplingPath& path, const Visit& visit) const {
+    for (const CouplingPath::Joint& joint : path.joints) {
+      if (joint.sign == 0) continue;
+      const Index first = model_.tree.first_v(joint.slot);
+      for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) visit(first + k, static_cast<std::size_t>(joint.at + k));
+    }
+  }
+  /// to = combine(to, G^T multipliers) on the paths, row by row; numbers: those of G, or J.
+  template <class Combine>
+  void push(const std::vector<S>& multipliers, const std::vector<S>& numbers, Field<S>& to, const Combine& combine) const {
+    for (const CouplingPath& path : paths_.all()) {
+      each_on_path(path, [&](Index v, std::size_t at_row) {
+        S sum(0.0);
+        for (std::size_t j = 0; j < path.rows(); ++j) {
+          sum = sum + multipliers[path.first_row + j] * numbers[path.first_velocity + j * path.velocities + at_row];
+        }
+        to(v) = combine(to(v), sum);
+      });
+    }
+  }
+
+ private:
+  static Placement<S> placement_of(const Pose& pose) {
+    double numbers[12];
+    std::ranges::copy(pose.rotation, numbers);
+    std::ranges::copy(pose.shift, numbers + 9);
+    return Placement<S>::from(numbers);
+  }
+  /// Gaps where bodies are at pose(slot) and coordinates moved by delta(row), and how joints change them; scales as well where it is asked.
+  template <class PoseOf, class DeltaOf>
+  void look(const PoseOf& pose, const DeltaOf& delta, std::vector<S>& numbers, bool scales) {
+    std::size_t term = 0;
+    for (const CouplingPath& path : paths_.all()) {
+      const Coupling& coupling = *path.coupling;
+      if (coupling.kind == CouplingKind::gear) {
+        S& gap = gap_[path.first_row] = as<S>(coupling.offset);
+        for (std::size_t k = 0; k < coupling.terms.size(); ++k, ++term) {
+          gap = gap + as<S>(coupling.terms[k].ratio) * (at_start_[term] + delta(coupling.terms[k].v_row));
+          numbers[path.first_velocity + path.terms[k]] = as<S>(coupling.terms[k].ratio);
+        }
+        if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.gear_yield));
+        continue;
+      }
+      const Placement<S> A = placed_in(pose(coupling.slot_a), placement_of(coupling.frame_a)),
+                         B = placed_in(pose(coupling.slot_b), placement_of(coupling.frame_b));
+      const std::span<const GapRow> kinds = rows_of(coupling.kind);
+      std::array<Gap<S>, 6> gaps;
+      for (std::size_t j = 0; j < kinds.size(); ++j) {
+        gaps[j] = gap_of(kinds[j], coupling.length, A, B);
+        gap_[path.first_row + j] = gaps[j].gap;
+      }
+      for (const CouplingPath::Joint& on : path.joints) {
+        if (on.sign == 0) continue;
+        const Placement<S> T = pose(on.slot);
+        with_joint(model_.tree.kind(on.slot), [&](auto joint) {
+          for (std::size_t j = 0; j < kinds.size(); ++j) {
+            gap_along(joint, model_.constants, on.slot, T, B.p, gaps[j], as<S>(on.sign),
+                      &numbers[path.first_velocity + j * path.velocities + static_cast<std::size_t>(on.at)]);
+          }
+        });
+      }
+      for (std::size_t j = 0; scales && j < kinds.size(); ++j) scale_[path.first_row + j] = scale_of(path, gaps[j], B.p, pose);
+    }
+  }
+
+  /// 1 / root of how far a row would move were its bodies free.
+  template <class PoseOf>
+  static S scale_of(const CouplingPath& path, const Gap<S>& gap, const Vec3<S>& x_b, const PoseOf& pose) {
+    using std::sqrt;
+    const auto moved = [&](Index slot, const std::array<double, 36>& yield) {
+      const Placement<S> T = pose(slot);
+      const Vec3<S> moment = gap.couple + cross(x_b - T.p, gap.force);
+      const Twist<S> w{transpose_times(T.R, moment), transpose_times(T.R, gap.force)};
+      const Wrench<S> moves = Mat6<S>::from(yield.data()) * w;  // a wrench in, a twist out: the names are those of an inertia
+      return dot(moves, w);
+    };
+    return S(1.0) / sqrt(moved(path.coupling->slot_a, path.yield_a) + moved(path.coupling->slot_b, path.yield_b));
+  }
+
+  const Model& model_;
+  CouplingPaths paths_;
+  Field<S, 12> pose_;            // body -> world at q^k, of bodies that are reached
+  std::vector<S> begin_, end_;
+  std::vector<S> at_start_;      // coordinates of gears at q^k
+  std::vector<S> gap_, size_, scale_;
+  bool keeps_scales_ = false;
+};
+
+}  // namespace linden
