@@ -147,12 +147,19 @@ class PathMaker {
     path_.on_path = 0;
     for (const Index slot : gone_through) {
       const auto found = signs_.find(slot);
-      path_.joints.push_back({slot, at, found == signs_.end() ? 0 : found->second});
+      path_.joints.push_back({slot, at, found == signs_.end() ? 0 : found->second, -1});
       at += velocity_count(tree_.kind(slot));
       if (found != signs_.end()) path_.on_path = static_cast<std::size_t>(at);
     }
     path_.velocities = path_.numbers = static_cast<std::size_t>(at);
     path_.slots.assign(gone_through.begin(), gone_through.end());
+    for (CouplingPath::Joint& joint : path_.joints) joint.above = number_of(tree_.parent(joint.slot));
+    path_.at_a = number_of(coupling_.slot_a);
+    path_.at_b = number_of(coupling_.slot_b);
+  }
+  Index number_of(Index slot) const {
+    const auto found = std::ranges::find(path_.joints, slot, &CouplingPath::Joint::slot);
+    return found == path_.joints.end() || found->sign == 0 ? -1 : static_cast<Index>(found - path_.joints.begin());
   }
   void add_term(const GearTerm& term) {
     const Index slot = slot_of(term);

@@ -20,11 +20,12 @@ namespace linden {
 
 struct CouplingPath {
   /// A joint that is gone through, where its velocities are among the path's, and how it moves b against a: 1 on the way to b, -1 on the way
-  /// to a, 0 above both.
+  /// to a, 0 above both. above: number of the joint of its parent among these, -1 where that is the body that both hang on.
   struct Joint {
     Index slot;
     Index at;
     double sign;
+    Index above;
   };
   /// A closure that is gone past, and where its rows are among the path's numbers.
   struct Passed {
@@ -52,6 +53,7 @@ struct CouplingPath {
   std::size_t numbers;                // velocities, and rows of closures that are passed
   std::vector<Meeting> meetings;      // with those of its closure, itself too, in their order; then with those of each closure that is passed
   std::vector<std::size_t> terms;     // of a gear: where the velocity of each term is
+  Index at_a, at_b;                   // numbers of the joints of a and b, -1 of the body that both hang on
   Index closes_at;                    // body, 0: the world
   std::size_t closure;                // number of the one it closes in
   std::size_t first_in_closure;       // its first row, among that one's

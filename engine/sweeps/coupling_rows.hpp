@@ -1,7 +1,10 @@
 // Rows of couplings where bodies are: gaps, and how joints change them.
 //
-//   place       q^k: where bodies are, G on the paths
-//   find_gaps   q^k+1 of a displacement: gaps, J on the paths
+//   place       q^k: gaps, and G on the paths
+//   find_gaps   q^k+1: gaps, and J on the paths
+//
+// Bodies of a coupling are placed from the body that both hang on, joint by joint: what is rounded on the way from the world is of no account to
+// a gap, at the end of a rope of a thousand cells as at its beginning.
 //
 // A row is scaled by how far it would move were its bodies free: metres and radians are alike then, and so are rows that others hold already.
 #pragma once
@@ -13,6 +16,7 @@
 #include <vector>
 
 #include "engine/sweeps/coupling_paths.hpp"
+#include "kernels/block/evaluate_down.hpp"
 #include "kernels/couplings/gap_map.hpp"
 #include "layout/model.hpp"
 
@@ -23,7 +27,9 @@ class CouplingRows {
  public:
   CouplingRows(const Model& model, Closing closing) : model_(model), paths_(model, closing) {
     if (empty()) return;
-    pose_.allocate(model.tree.shape.slots);
+    std::size_t longest = 0;
+    for (const CouplingPath& path : paths_.all()) longest = std::max(longest, path.joints.size());
+    pose_.allocate(static_cast<Index>(longest));
     for (std::vector<S>* each : {&gap_, &size_, &scale_}) each->assign(count(), S(0.0));
     for (std::vector<S>* each : {&begin_, &end_}) each->assign(paths_.velocities(), S(0.0));
     for (const CouplingPath& path : paths_.all()) {
@@ -40,27 +46,21 @@ class CouplingRows {
   const CouplingPaths& paths() const { return paths_; }
   bool is_rigid(std::size_t row) const { return paths_.is_rigid(row); }
 
-  /// Bodies at q^k, where the tree's placements are; gears by their coordinates.
+  /// At q^k, where the tree's placements are.
   void place(const Field<S, 12>& placement, const Field<S>& q) {
-    const S zero(0.0), one(1.0);
-    store(pose_, 0, Placement<S>{{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}}, {zero, zero, zero}});
-    for (auto slot = paths_.reached().rbegin(); slot != paths_.reached().rend(); ++slot) {
-      store(pose_, *slot, placed_in(load<Placement, S>(pose_, model_.tree.parent(*slot)), load<Placement, S>(placement, *slot)));
-    }
     for (std::size_t term = 0; const CouplingPath& path : paths_.all()) {
       for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
     }
-    look([&](Index slot) { return load<Placement, S>(pose_, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
+    look([&](auto, Index slot) { return load<Placement, S>(placement, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
   }
   /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
   void keep_scales(bool keep) { keeps_scales_ = keep; }
 
-  /// Gaps at the end of a displacement, and how joints change them there.
-  void find_gaps(const Field<S, 7>& displacement, const Field<S>& delta) {
-    look([&](Index slot) { return moved_by(load<Placement, S>(pose_, slot), load<Displacement, S>(displacement, slot)); },
+  /// Gaps at the end of motions of the joints, and how joints change them there.
+  void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta) {
+    look([&](auto joint, Index slot) { return after_motion(joint, load<Placement, S>(placement, slot), load_motion(joint, motion, slot)); },
          [&](Index row) { return delta(row); }, end_, false);
   }
-
 
   /// Of each row [m], or without a unit; by what it is judged; 1 / root of how far it would move were its bodies free.
   const std::vector<S>& gaps() const { return gap_; }
@@ -127,9 +127,15 @@ class CouplingRows {
     std::ranges::copy(pose.shift, numbers + 9);
     return Placement<S>::from(numbers);
   }
-  /// Gaps where bodies are at pose(slot) and coordinates moved by delta(row), and how joints change them; scales as well where it is asked.
-  template <class PoseOf, class DeltaOf>
-  void look(const PoseOf& pose, const DeltaOf& delta, std::vector<S>& numbers, bool scales) {
+  /// Where bodies of a path are, from the body that both of its bodies hang on.
+  Placement<S> pose(Index number) const {
+    const S zero(0.0), one(1.0);
+    return number >= 0 ? load<Placement, S>(pose_, number) : Placement<S>{{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}}, {zero, zero, zero}};
+  }
+  /// Gaps where bodies are placed by their joints and coordinates moved by delta(row), and how joints change them; scales as well where it is
+  /// asked.
+  template <class PlacementOf, class DeltaOf>
+  void look(const PlacementOf& placement, const DeltaOf& delta, std::vector<S>& numbers, bool scales) {
     std::size_t term = 0;
     for (const CouplingPath& path : paths_.all()) {
       const Coupling& coupling = *path.coupling;
@@ -142,45 +148,51 @@ class CouplingRows {
         if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.gear_yield));
         continue;
       }
-      const Placement<S> A = placed_in(pose(coupling.slot_a), placement_of(coupling.frame_a)),
-                         B = placed_in(pose(coupling.slot_b), placement_of(coupling.frame_b));
+      for (std::size_t k = path.joints.size(); k-- > 0;) {
+        const CouplingPath::Joint& on = path.joints[k];
+        if (on.sign == 0) continue;
+        with_joint(model_.tree.kind(on.slot), [&](auto joint) {
+          const Placement<S> X = placement(joint, on.slot);
+          store(pose_, static_cast<Index>(k), on.above >= 0 ? placed_in(pose(on.above), X) : X);
+        });
+      }
+      const Placement<S> A = placed_in(pose(path.at_a), placement_of(coupling.frame_a)), B = placed_in(pose(path.at_b), placement_of(coupling.frame_b));
       const std::span<const GapRow> kinds = rows_of(coupling.kind);
       std::array<Gap<S>, 6> gaps;
       for (std::size_t j = 0; j < kinds.size(); ++j) {
         gaps[j] = gap_of(kinds[j], coupling.length, A, B);
         gap_[path.first_row + j] = gaps[j].gap;
       }
-      for (const CouplingPath::Joint& on : path.joints) {
+      for (std::size_t k = 0; k < path.joints.size(); ++k) {
+        const CouplingPath::Joint& on = path.joints[k];
         if (on.sign == 0) continue;
-        const Placement<S> T = pose(on.slot);
         with_joint(model_.tree.kind(on.slot), [&](auto joint) {
           for (std::size_t j = 0; j < kinds.size(); ++j) {
-            gap_along(joint, model_.constants, on.slot, T, B.p, gaps[j], as<S>(on.sign),
+            gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), B.p, gaps[j], as<S>(on.sign),
                       &numbers[path.first_velocity + j * path.velocities + static_cast<std::size_t>(on.at)]);
           }
         });
       }
-      for (std::size_t j = 0; scales && j < kinds.size(); ++j) scale_[path.first_row + j] = scale_of(path, gaps[j], B.p, pose);
+      for (std::size_t j = 0; scales && j < kinds.size(); ++j) scale_[path.first_row + j] = scale_of(path, gaps[j], B.p);
     }
   }
 
   /// 1 / root of how far a row would move were its bodies free.
-  template <class PoseOf>
-  static S scale_of(const CouplingPath& path, const Gap<S>& gap, const Vec3<S>& x_b, const PoseOf& pose) {
+  S scale_of(const CouplingPath& path, const Gap<S>& gap, const Vec3<S>& x_b) const {
     using std::sqrt;
-    const auto moved = [&](Index slot, const std::array<double, 36>& yield) {
-      const Placement<S> T = pose(slot);
+    const auto moved = [&](Index number, const std::array<double, 36>& yield) {
+      const Placement<S> T = pose(number);
       const Vec3<S> moment = gap.couple + cross(x_b - T.p, gap.force);
       const Twist<S> w{transpose_times(T.R, moment), transpose_times(T.R, gap.force)};
       const Wrench<S> moves = Mat6<S>::from(yield.data()) * w;  // a wrench in, a twist out: the names are those of an inertia
       return dot(moves, w);
     };
-    return S(1.0) / sqrt(moved(path.coupling->slot_a, path.yield_a) + moved(path.coupling->slot_b, path.yield_b));
+    return S(1.0) / sqrt(moved(path.at_a, path.yield_a) + moved(path.at_b, path.yield_b));
   }
 
   const Model& model_;
   CouplingPaths paths_;
-  Field<S, 12> pose_;            // body -> world at q^k, of bodies that are reached
+  Field<S, 12> pose_;            // scratch: of a path, see pose()
   std::vector<S> begin_, end_;
   std::vector<S> at_start_;      // coordinates of gears at q^k
   std::vector<S> gap_, size_, scale_;

@@ -81,7 +81,7 @@ class CouplingSweeps {
   /// Whether some row does.
   bool gives_way() const { return !springs_.empty(); }
 
-  /// Bodies at q^k, where the tree's placements are; gears by their coordinates.
+  /// At q^k, where the tree's placements are.
   void place(const Field<S, 12>& placement, const Field<S>& q) {
     if (empty()) return;
     rows_.place(placement, q);
@@ -94,9 +94,9 @@ class CouplingSweeps {
     std::ranges::fill(increment_, S(0.0));
     springs_.begin(h);
   }
-  /// Gaps at the end of a displacement, and how joints change them there.
-  void find_gaps(const Field<S, 7>& displacement, const Field<S>& delta) {
-    if (!empty()) rows_.find_gaps(displacement, delta);
+  /// Gaps at the end of motions of the joints, and how joints change them there.
+  void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta) {
+    if (!empty()) rows_.find_gaps(placement, motion, delta);
   }
 
   /// sweep(slots) of all bodies, leaves to root, in parts: at(closure) once all bodies beyond that where it closes have been met, and it has

@@ -366,7 +366,7 @@ class LaneSweeps {
   bool is_solved() { return tied() || coupled(); }
 
   // what couplings do (coupling_sweeps.hpp); not inline, as above
-  [[gnu::noinline]] void find_gaps() { couplings_.find_gaps(work_.displacement, work_.delta); }
+  [[gnu::noinline]] void find_gaps() { couplings_.find_gaps(work_.placement, work_.motion, work_.delta); }
   [[gnu::noinline]] void close(std::size_t closure, Coupled of, const Gains<Pack>& gains, const Mask& lanes) {
     const std::array<Pack, 36> felt =
         couplings_.close(closure, of, constants_, work_.placement, of == Coupled::step ? &work_.motion : nullptr, gains, factor_.fresh_ties(), lanes);

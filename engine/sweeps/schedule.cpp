@@ -292,8 +292,8 @@ void Writer::evaluation() {
     m.now.energy += momentum_map(m.model.tree, m.constants, m.work.displacement, part, m.work.impulse);
   }, draft_.strategy.order == Order::long_chain ? Way::parents_up : Way::down);
   if (couplings()) {
-    add(When::evaluation, "couplings: gaps", "screw, displacement, delta, couplings", "couplings",
-        [](Memory m, Slots) { m.couplings.find_gaps(m.work.displacement, m.work.delta); });
+    add(When::evaluation, "couplings: gaps", "screw, placement, motion, delta, couplings", "couplings",
+        [](Memory m, Slots) { m.couplings.find_gaps(m.work.placement, m.work.motion, m.work.delta); });
   }
   add_action_of_effects(draft_);
   std::string added = draft_.plan.joints ? ", joint impulses" : "";

@@ -79,7 +79,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
   in_parts_down(all_slots(model_.tree), [&](Slots part) { down(part, now); });
   before_up(all_slots(model_.tree), now);
   now.scale = now.energy;
-  couplings_.find_gaps(work_.displacement, work_.delta);
+  couplings_.find_gaps(work_.placement, work_.motion, work_.delta);
   act(now);
   pass_up(now, factor);
   return now;

@@ -53,12 +53,6 @@ Gap<S> gap_of(const GapRow& row, double length, const Placement<S>& A, const Pla
   return {distance - as<S>(length), d / distance, none};
 }
 
-/// T after the displacement D.
-template <class S>
-LINDEN_INLINE Placement<S> moved_by(const Placement<S>& T, const Displacement<S>& D) {
-  return {T.R * rotation(D.r), T.p + T.R * D.p};
-}
-
 /// A placement within another.
 template <class S>
 LINDEN_INLINE Placement<S> placed_in(const Placement<S>& T, const Placement<S>& frame) {
