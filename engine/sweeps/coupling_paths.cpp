@@ -148,7 +148,10 @@ class PathMaker {
     for (const Index slot : gone_through) {
       const auto found = signs_.find(slot);
       path_.joints.push_back({slot, at, found == signs_.end() ? 0 : found->second, -1});
-      at += velocity_count(tree_.kind(slot));
+      for (Index k = 0; k < velocity_count(tree_.kind(slot)); ++k, ++at) {
+        path_.velocity_rows.push_back(tree_.first_v(slot) + k);
+        if (found != signs_.end()) path_.moving.push_back(static_cast<std::size_t>(at));
+      }
       if (found != signs_.end()) path_.on_path = static_cast<std::size_t>(at);
     }
     path_.velocities = path_.numbers = static_cast<std::size_t>(at);
@@ -225,7 +228,7 @@ class Sets {
 
 }  // namespace
 
-CouplingPaths::CouplingPaths(const Model& model, Closing closing) {
+CouplingPaths::CouplingPaths(const Model& model, Closing closing, std::size_t side_by_side) {
   const bool at_world = closing == Closing::at_world || !model.mimics.empty();
   std::set<Index, std::greater<>> reached;
   const auto reach = [&](Index slot) {
@@ -237,8 +240,9 @@ CouplingPaths::CouplingPaths(const Model& model, Closing closing) {
     CouplingPath& path = paths_.emplace_back(PathMaker(model, coupling, at_world).make());
     path.first_row = row;
     path.last_row = row += rows_of(coupling.kind).size();
+    path.room = (path.rows() + side_by_side - 1) / side_by_side * side_by_side;
     path.first_velocity = velocities_;
-    velocities_ += path.rows() * path.velocities;
+    velocities_ += path.room * path.velocities;
     for (const GapRow& kind : rows_of(coupling.kind)) rigid_.push_back(compliance_of(coupling, kind).gives_way() ? 0 : 1);
     for (const CouplingPath::Joint& joint : path.joints) reach(joint.slot);
   }
@@ -296,7 +300,7 @@ void CouplingPaths::close(const Model& model) {
       path.numbers += closures_[number].rows.size();
     }
     path.first_number = numbers_;
-    numbers_ += path.rows() * path.numbers;
+    numbers_ += path.room * path.numbers;
   }
   for (std::size_t k = 0; k < paths_.size(); ++k) {
     CouplingPath& path = paths_[k];

@@ -44,10 +44,13 @@ struct CouplingPath {
 
   const Coupling* coupling;
   std::size_t first_row, last_row;    // of all rows of all couplings
-  std::size_t first_velocity;         // of what is kept for each row and velocity
-  std::size_t first_number;           // of what is kept for each row and number
+  std::size_t room;                   // for a number of each row (kernels/couplings/row_lanes.hpp)
+  std::size_t first_velocity;         // of what is kept for each velocity and row
+  std::size_t first_number;           // of what is kept for each number and row
   std::vector<Joint> joints;          // leaves first; those that move b against a come first
   std::vector<Index> slots;           // of the joints
+  std::vector<Index> velocity_rows;   // of each velocity, its row among the tree's
+  std::vector<std::size_t> moving;    // velocities that move b against a
   std::vector<Passed> passed;         // in the order of a way up
   std::size_t velocities, on_path;    // of all joints; of those up to the last that moves b against a
   std::size_t numbers;                // velocities, and rows of closures that are passed
@@ -79,7 +82,8 @@ enum class Closing : std::uint8_t {
 
 class CouplingPaths {
  public:
-  CouplingPaths(const Model& model, Closing closing);
+  /// side_by_side: rows of a coupling in a register.
+  CouplingPaths(const Model& model, Closing closing, std::size_t side_by_side);
   // not inline: those that use it are compiled for one processor each
   ~CouplingPaths();
   CouplingPaths(const CouplingPaths&) = delete;
@@ -94,7 +98,7 @@ class CouplingPaths {
   const CouplingPath& path_of(std::size_t row) const;
   /// Whether a row of all of them does not give way.
   bool is_rigid(std::size_t row) const { return rigid_[row] != 0; }
-  /// What is kept for each row and velocity of its path; for each row and number.
+  /// What is kept for each velocity of a path and row; for each number and row.
   std::size_t velocities() const { return velocities_; }
   std::size_t numbers() const { return numbers_; }
   /// Bodies on the way of any coupling to the world, and those from joints that are tied to each other; leaves first.

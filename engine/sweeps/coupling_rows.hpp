@@ -18,14 +18,16 @@
 #include "engine/sweeps/coupling_paths.hpp"
 #include "kernels/block/evaluate_down.hpp"
 #include "kernels/couplings/gap_map.hpp"
+#include "kernels/couplings/row_lanes.hpp"
 #include "layout/model.hpp"
 
 namespace linden {
 
-template <class S>
+/// Side: of rows in memory.
+template <class S, class Side = RowLanes<S, RowPack<S>>>
 class CouplingRows {
  public:
-  CouplingRows(const Model& model, Closing closing) : model_(model), paths_(model, closing) {
+  CouplingRows(const Model& model, Closing closing) : model_(model), paths_(model, closing, Side::count) {
     if (empty()) return;
     std::size_t longest = 0;
     for (const CouplingPath& path : paths_.all()) longest = std::max(longest, path.joints.size());
@@ -66,7 +68,7 @@ class CouplingRows {
   const std::vector<S>& gaps() const { return gap_; }
   const std::vector<S>& sizes() const { return size_; }
   const std::vector<S>& scales() const { return scale_; }
-  /// G at q^k, J at q^k+1: of each row what every velocity of its path does.
+  /// G at q^k, J at q^k+1: what every velocity of a path does to each of its rows.
   const std::vector<S>& at_begin() const { return begin_; }
   const std::vector<S>& at_end() const { return end_; }
 
@@ -91,29 +93,25 @@ class CouplingRows {
 
   /// G v of a row.
   S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const {
-    const S* g = &begin_[path.first_velocity + (row - path.first_row) * path.velocities];
+    const S* const g = &begin_[path.first_velocity + (row - path.first_row)];
     S sum(0.0);
-    each_on_path(path, [&](Index at_v, std::size_t at_row) { sum = sum + g[at_row] * v(at_v); });
+    each_on_path(path, [&](Index at_v, std::size_t n) { sum = sum + g[n * path.room] * v(at_v); });
     return sum;
   }
 
   /// visit(velocity row, where it is among the path's) of joints that move the bodies of a coupling against each other.
   template <class Visit>
   void each_on_path(const CouplingPath& path, const Visit& visit) const {
-    for (const CouplingPath::Joint& joint : path.joints) {
-      if (joint.sign == 0) continue;
-      const Index first = model_.tree.first_v(joint.slot);
-      for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) visit(first + k, static_cast<std::size_t>(joint.at + k));
-    }
+    for (const std::size_t n : path.moving) visit(path.velocity_rows[n], n);
   }
-  /// to = combine(to, G^T multipliers) on the paths, row by row; numbers: those of G, or J.
+  /// to = combine(to, G^T multipliers) on the paths; numbers: those of G, or J.
   template <class Combine>
   void push(const std::vector<S>& multipliers, const std::vector<S>& numbers, Field<S>& to, const Combine& combine) const {
     for (const CouplingPath& path : paths_.all()) {
-      each_on_path(path, [&](Index v, std::size_t at_row) {
+      each_on_path(path, [&](Index v, std::size_t n) {
         S sum(0.0);
         for (std::size_t j = 0; j < path.rows(); ++j) {
-          sum = sum + multipliers[path.first_row + j] * numbers[path.first_velocity + j * path.velocities + at_row];
+          sum = sum + multipliers[path.first_row + j] * numbers[path.first_velocity + n * path.room + j];
         }
         to(v) = combine(to(v), sum);
       });
@@ -143,7 +141,7 @@ class CouplingRows {
         S& gap = gap_[path.first_row] = as<S>(coupling.offset);
         for (std::size_t k = 0; k < coupling.terms.size(); ++k, ++term) {
           gap = gap + as<S>(coupling.terms[k].ratio) * (at_start_[term] + delta(coupling.terms[k].v_row));
-          numbers[path.first_velocity + path.terms[k]] = as<S>(coupling.terms[k].ratio);
+          numbers[path.first_velocity + path.terms[k] * path.room] = as<S>(coupling.terms[k].ratio);
         }
         if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.gear_yield));
         continue;
@@ -168,8 +166,10 @@ class CouplingRows {
         if (on.sign == 0) continue;
         with_joint(model_.tree.kind(on.slot), [&](auto joint) {
           for (std::size_t j = 0; j < kinds.size(); ++j) {
-            gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), B.p, gaps[j], as<S>(on.sign),
-                      &numbers[path.first_velocity + j * path.velocities + static_cast<std::size_t>(on.at)]);
+            S along[6];
+            gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), B.p, gaps[j], as<S>(on.sign), along);
+            S* const to = &numbers[path.first_velocity + static_cast<std::size_t>(on.at) * path.room + j];
+            for (std::size_t n = 0; n < static_cast<std::size_t>(velocity_count(joint)); ++n) to[n * path.room] = along[n];
           }
         });
       }

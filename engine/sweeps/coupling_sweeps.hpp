@@ -49,16 +49,21 @@
 
 namespace linden {
 
-template <class S>
+/// Pack: what rows of a coupling are side by side in (row_lanes.hpp).
+template <class S, class Pack = RowPack<S>>
 class CouplingSweeps {
  public:
   using Mask = typename LanesOf<S>::Mask;
+  using Side = RowLanes<S, Pack>;
 
   /// yields: of each row (coupling_yields.hpp); empty where none gives way.
   CouplingSweeps(const Model& model, std::span<const double> yields, Closing closing = Closing::nearest) : model_(model), rows_(model, closing) {
     if (empty()) return;
     const Shape& shape = model.tree.shape;
     bias_.allocate(shape.slots);
+    std::size_t most = 0;
+    for (const Closure& closure : closures()) most = std::max(most, closure.rows.size());
+    right_sides_.resize(most, Pack(0.0));
     for (std::vector<S>* each : {&lambda_, &increment_, &pull_, &rho_}) each->assign(rows(), S(0.0));
     for (std::vector<S>* each : {&across_, &columns_}) each->assign(paths().numbers(), S(0.0));
     for (const Closure& closure : closures()) factors_.emplace_back(closure.rows.size());
@@ -74,6 +79,7 @@ class CouplingSweeps {
     for (Field<S>& row : felt_) row.allocate(shape.velocities);
     pulls_.assign(coordinates, S(0.0));
     if (coordinates > 0) tied_.allocate(shape.velocities, S(0.0));
+    if (coordinates > 0) tied_bias_.allocate(shape.slots);
     if (gives_way()) ends_.allocate(shape.velocities, S(0.0));
   }
 
@@ -136,18 +142,17 @@ class CouplingSweeps {
     const auto here = [&](auto, Index i) { return load<Placement, S>(placement, i); };
     const auto at_end = [&](auto joint, Index i) { return after_motion(joint, load<Placement, S>(placement, i), load_motion(joint, *motion, i)); };
     const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
-    const auto rows_up = [&](const auto& arrives) {
+    const auto paths_up = [&](const auto& arrives) {
       if (closure == 0) feel(constants, arrives, gains, ties, lanes);
       for (const std::size_t k : closures()[closure].paths) {
         const CouplingPath& path = paths().all()[k];
-        for (std::size_t j = 0; j < path.rows(); ++j) row_up(path, j, jacobian, constants, arrives, gains, ties, lanes);
+        for (std::size_t first = 0; first < path.rows(); first += Side::count) column_up(path, first, constants, here, gains, lanes);
+        for (std::size_t first = 0; first < path.rows(); first += Side::count) row_up(path, first, jacobian, constants, arrives, gains, lanes);
+        move_ties(path, ties);
+        cross_ties(path, jacobian, ties, lanes);
       }
     };
-    for (const std::size_t k : closures()[closure].paths) {
-      const CouplingPath& path = paths().all()[k];
-      for (std::size_t j = 0; j < path.rows(); ++j) column_up(path, j, constants, here, gains, ties, lanes);
-    }
-    motion != nullptr ? rows_up(at_end) : rows_up(here);
+    motion != nullptr ? paths_up(at_end) : paths_up(here);
     factor(closure, of, ties.coordinates(), lanes, damping);
     return felt_above(closure);
   }
@@ -168,25 +173,32 @@ class CouplingSweeps {
   void yield(std::size_t closure, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
     const Closure& closes = closures()[closure];
     ClosureFactor& kept = factors_[closure];
-    if (closure == 0) moved_ties(ties, paths().reached(), [&](Index v, Index) { return innovation(v); });
-    std::size_t at = 0;
+    if (closure == 0) moved_ties(ties, paths().reached(), [&](Index v, std::size_t) { return innovation(v); });
     for (const std::size_t k : closes.paths) {
       const CouplingPath& path = paths().all()[k];
-      for (std::size_t j = 0; j < path.rows(); ++j, ++at) {
-        const S* const numbers = &across_[path.first_number + j * path.numbers];
-        S sum = rho_[path.first_row + j];
-        each_velocity(path, [&](Index v, std::size_t n) { sum = sum + numbers[n] * innovation(v); });
+      for (std::size_t first = 0; first < path.rows(); first += Side::count) {
+        const S* const numbers = &across_[path.first_number + first];
+        Pack sum(0.0);
+        each_velocity(path, [&](Index v, std::size_t n) { sum = sum + Side::load(numbers + n * path.room) * Pack(innovation(v)); });
         for (const CouplingPath::Passed& passed : path.passed) {
           const std::vector<std::size_t>& rows = closures()[passed.closure].rows;
-          for (std::size_t i = 0; i < rows.size(); ++i) sum = sum + numbers[passed.at + i] * rho_[rows[i]];
+          for (std::size_t i = 0; i < rows.size(); ++i) sum = sum + Side::load(numbers + (passed.at + i) * path.room) * Pack(rho_[rows[i]]);
         }
-        for (std::size_t c = 0; c < pulls_.size(); ++c) sum = sum + tied_across_[(path.first_row + j) * pulls_.size() + c] * (*tied_moved_)[c];
-        kept.right_side[at] = sum;
+        each_row_of(path, first, sum, [&](std::size_t j, const S& along) {
+          const std::size_t row = path.first_row + j;
+          S& right_side = kept.right_side[path.first_in_closure + j] = rho_[row] + along;
+          for (std::size_t c = 0; c < pulls_.size(); ++c) right_side = right_side + tied_across_[row * pulls_.size() + c] * (*tied_moved_)[c];
+        });
       }
     }
-    solve(closure);
-    for (at = 0; at < closes.rows.size(); ++at) rho_[closes.rows[at]] = kept.right_side[at];
-    if (closes.slot != 0) store(bias, closes.slot, load<Wrench, S>(bias, closes.slot) - passed_up(closure));
+    solve(closure, kept.right_side.data());
+    for (std::size_t k = 0; k < closes.rows.size(); ++k) rho_[closes.rows[k]] = kept.right_side[k];
+    if (closes.slot == 0) return;
+    for (int c = 0; c < 6; ++c) {
+      S sum(0.0);
+      for (std::size_t k = 0; k < closes.rows.size(); ++k) sum = sum + kept.up[kSix * k + static_cast<std::size_t>(c)] * kept.right_side[k];
+      bias(closes.slot, c) = bias(closes.slot, c) - sum;
+    }
   }
   /// Within down_from_closures of the second half of a solve, where it is known how the body where it closes moves: the innovation of joints
   /// beyond becomes that of r - G^T dlambda.
@@ -194,18 +206,23 @@ class CouplingSweeps {
     const Closure& closes = closures()[closure];
     const ClosureFactor& kept = factors_[closure];
     std::vector<S>& multipliers = of == Coupled::step ? increment_ : pull_;
-    std::size_t at = 0;
     for (const std::size_t k : closes.paths) {
       const CouplingPath& path = paths().all()[k];
-      for (std::size_t j = 0; j < path.rows(); ++j, ++at) {
+      const S* const of_path = &multipliers[path.first_row];
+      for (std::size_t j = 0; j < path.rows(); ++j) {
         S& multiplier = multipliers[path.first_row + j] = rho_[path.first_row + j];
-        for (int c = 0; closes.slot != 0 && c < 6; ++c) multiplier = multiplier - kept.down[6 * at + static_cast<std::size_t>(c)] * variation(closes.slot, c);
-        const S* const numbers = &columns_[path.first_number + j * path.numbers];
-        each_velocity(path, [&](Index v, std::size_t n) { innovation(v) = innovation(v) - numbers[n] * multiplier; });
-        for (const CouplingPath::Passed& passed : path.passed) {
-          const std::vector<std::size_t>& rows = closures()[passed.closure].rows;
-          for (std::size_t i = 0; i < rows.size(); ++i) rho_[rows[i]] = rho_[rows[i]] - numbers[passed.at + i] * multiplier;
-        }
+        const S* const down = &kept.down[kSix * (path.first_in_closure + j)];
+        for (int c = 0; closes.slot != 0 && c < 6; ++c) multiplier = multiplier - down[c] * variation(closes.slot, c);
+      }
+      const auto pushed = [&](std::size_t n) {
+        S sum(0.0);
+        for (std::size_t j = 0; j < path.rows(); ++j) sum = sum + columns_[path.first_number + n * path.room + j] * of_path[j];
+        return sum;
+      };
+      each_velocity(path, [&](Index v, std::size_t n) { innovation(v) = innovation(v) - pushed(n); });
+      for (const CouplingPath::Passed& passed : path.passed) {
+        const std::vector<std::size_t>& rows = closures()[passed.closure].rows;
+        for (std::size_t i = 0; i < rows.size(); ++i) rho_[rows[i]] = rho_[rows[i]] - pushed(passed.at + i);
       }
     }
   }
@@ -306,13 +323,14 @@ class CouplingSweeps {
   const Coupling& coupling_of(std::size_t row) const { return *paths().path_of(row).coupling; }
 
  private:
+  static constexpr std::size_t kSix = Side::room(6);  // numbers of a wrench or a twist
   static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
   static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
 
   /// Of the rows that close together.
   struct ClosureFactor {
     explicit ClosureFactor(std::size_t rows)
-        : solve(rows), fresh(rows), moved_by_itself(rows, S(0.0)), up(6 * rows, S(0.0)), down(6 * rows, S(0.0)), right_side(rows, S(0.0)) {}
+        : solve(rows), fresh(rows), moved_by_itself(rows, S(0.0)), up(kSix * rows, S(0.0)), down(kSix * rows, S(0.0)), right_side(rows, S(0.0)) {}
     MaskedSolve<S> solve, fresh;
     std::vector<S> moved_by_itself;  // diagonal of S, scaled
     std::vector<S> up, down;         // b of each column, S^-1 y^T
@@ -335,145 +353,140 @@ class CouplingSweeps {
   }
   /// visit(velocity row, where it is among the path's numbers).
   template <class Visit>
-  void each_velocity(const CouplingPath& path, const Visit& visit) const {
-    for (const CouplingPath::Joint& joint : path.joints) {
-      const Index first = model_.tree.first_v(joint.slot);
-      for (Index k = 0; k < velocity_count(model_.tree.kind(joint.slot)); ++k) visit(first + k, static_cast<std::size_t>(joint.at + k));
-    }
+  static void each_velocity(const CouplingPath& path, const Visit& visit) {
+    for (std::size_t n = 0; n < path.velocities; ++n) visit(path.velocity_rows[n], n);
   }
 
+  /// visit(number of the row, its number) of rows from `first` on that are in the lanes of a register.
+  template <class Visit>
+  static void each_row_of(const CouplingPath& path, std::size_t first, const Pack& value, const Visit& visit) {
+    std::array<S, Side::count> numbers;
+    Side::store(value, numbers.data());
+    for (std::size_t l = 0; l < Side::count && first + l < path.rows(); ++l) visit(first + l, numbers[l]);
+  }
+  /// What a joint's numbers become, in these lanes of instances; to: of the first row.
   template <JointKind Kind>
-  static void put(Joint<Kind>, const Wrench<S>& value, const Mask& lanes, S* numbers) {
-    S now[6];
-    value.n.to(now);
-    if constexpr (Kind == JointKind::free) value.f.to(now + 3);
-    for (Index k = 0; k < velocity_count(Kind); ++k) numbers[k] = select(lanes, now[k], numbers[k]);
+  static void put(Joint<Kind>, const Wrench<Pack>& value, const Mask& lanes, std::size_t room, S* to) {
+    Pack now[6];
+    value.to(now);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(velocity_count(Kind)); ++k) Side::store(lanes, now[k], to + k * room);
   }
-  /// A row of numbers, joint by joint; none above those that move the bodies against each other.
-  static auto numbers_of(const CouplingPath& path, const S* numbers) {
-    return [&path, numbers]<JointKind Kind>(Joint<Kind>, std::size_t k) {
-      const Vec3<S> zero{S(0.0), S(0.0), S(0.0)};
-      const auto first = static_cast<std::size_t>(path.joints[k].at);
-      if (first >= path.on_path) return Wrench<S>{zero, zero};
-      const S* const from = numbers + first;
-      if constexpr (Kind == JointKind::screw) return Wrench<S>{{from[0], S(0.0), S(0.0)}, zero};
-      if constexpr (Kind == JointKind::ball) return Wrench<S>{Vec3<S>::from(from), zero};
-      return Wrench<S>{Vec3<S>::from(from), Kind == JointKind::free ? Vec3<S>::from(from + (Kind == JointKind::free ? 3 : 0)) : zero};
+  /// Rows from `first` on of G or J, joint by joint; none above those that move the bodies against each other.
+  static auto rows_of_path(const CouplingPath& path, std::size_t first, const std::vector<S>& numbers) {
+    return [&path, from = &numbers[path.first_velocity + first]]<JointKind Kind>(Joint<Kind>, std::size_t k) {
+      Pack row[6];
+      const auto at = static_cast<std::size_t>(path.joints[k].at), count = static_cast<std::size_t>(velocity_count(Kind));
+      for (std::size_t n = 0; n < 6; ++n) row[n] = n < count && at < path.on_path ? Side::load(from + (at + n) * path.room) : Pack(0.0);
+      return Wrench<Pack>::from(row);
     };
-  }
-  /// Sum of the products of what two paths share, `meeting` as the first has it.
-  static S product(const CouplingPath::Meeting& meeting, const S* of_first, const S* of_second) {
-    S sum(0.0);
-    for (const CouplingPath::Shared& shared : meeting.shared) {
-      const S *const a = of_first + shared.at_first, *const b = of_second + shared.at_second;
-      for (std::size_t k = 0; k < shared.count; ++k) sum = sum + a[k] * b[k];
-    }
-    return sum;
   }
 
-  /// What is left of a column of G^T where joints, and loops that are closed below, have yielded.
+  /// What is left of columns of G^T where joints, and loops that are closed below, have yielded.
   template <class Element, class PlacementOf>
-  void column_up(const CouplingPath& path, std::size_t j, const BodyConstants<Element>& constants, const PlacementOf& placement_of,
-                 const Gains<S>& gains, MimicTies<S>& ties, const Mask& lanes) {
-    S* const numbers = &columns_[path.first_number + j * path.numbers];
+  void column_up(const CouplingPath& path, std::size_t first, const BodyConstants<Element>& constants, const PlacementOf& placement_of,
+                 const Gains<S>& gains, const Mask& lanes) {
+    S* const numbers = &columns_[path.first_number + first];
     const auto past = [&](const CouplingPath::Passed& passed, std::size_t first_meeting) {
-      ClosureFactor& below = factors_[passed.closure];
+      const Closure& below = closures()[passed.closure];
       std::size_t at = 0;
-      for (std::size_t m = 0; m < closures()[passed.closure].paths.size(); ++m) {
+      for (std::size_t m = 0; m < below.paths.size(); ++m) {
         const CouplingPath::Meeting& meeting = path.meetings[first_meeting + m];
         const CouplingPath& other = paths().all()[meeting.path];
         for (std::size_t i = 0; i < other.rows(); ++i, ++at) {
-          below.right_side[at] = product(meeting, numbers, &across_[other.first_number + i * other.numbers]);
+          const S* const y = &across_[other.first_number + i];
+          Pack sum(0.0);
+          each_shared(meeting, [&](std::size_t n, std::size_t of_other) { sum = sum + Pack(y[of_other * other.room]) * Side::load(numbers + n * path.room); });
+          right_sides_[at] = sum;
         }
       }
-      solve(passed.closure);
-      for (std::size_t i = 0; i < at; ++i) numbers[passed.at + i] = select(lanes, below.right_side[i], numbers[passed.at + i]);
-      return passed_up(passed.closure);
+      solve(passed.closure, right_sides_.data());
+      Wrench<Pack> sum = no_wrench();
+      for (std::size_t i = 0; i < at; ++i) {
+        Side::store(lanes, right_sides_[i], numbers + (passed.at + i) * path.room);
+        sum = sum + right_sides_[i] * spread<Pack>(Wrench<S>::from(&factors_[passed.closure].up[kSix * i]));
+      }
+      return sum;
     };
-    const auto keep = [&](auto joint, std::size_t k, const Wrench<S>& u) { put(joint, u, lanes, numbers + path.joints[k].at); };
-    way_up(path, constants, placement_of, gains.up, numbers_of(path, &rows_.at_begin()[path.first_velocity + j * path.velocities]), past, keep);
-    keep_passed(path, j, lanes, factors_[path.closure].up);
-    if (ties.empty()) return;
-    moved_ties(ties, path.slots, [&](Index, Index n) { return numbers[n]; });
-    std::ranges::copy(*tied_moved_, tied_columns_.begin() + static_cast<std::ptrdiff_t>((path.first_row + j) * pulls_.size()));
+    const auto keep = [&](auto joint, std::size_t k, const Wrench<Pack>& u) { put(joint, u, lanes, path.room, numbers + number_of(path, k) * path.room); };
+    way_up(path, constants, placement_of, gains.up, rows_of_path(path, first, rows_.at_begin()), past, keep);
+    keep_passed(path, first, lanes, factors_[path.closure].up);
   }
-  /// What a row of J becomes: of each joint the number that u counts by.
+  /// What rows of J become: of each joint the number that u counts by.
   template <class Element, class PlacementOf>
-  void row_up(const CouplingPath& path, std::size_t j, const std::vector<S>& jacobian, const BodyConstants<Element>& constants,
-              const PlacementOf& placement_of, const Gains<S>& gains, const MimicTies<S>& ties, const Mask& lanes) {
-    S* const numbers = &across_[path.first_number + j * path.numbers];
-    const S* const row = &jacobian[path.first_velocity + j * path.velocities];
+  void row_up(const CouplingPath& path, std::size_t first, const std::vector<S>& jacobian, const BodyConstants<Element>& constants,
+              const PlacementOf& placement_of, const Gains<S>& gains, const Mask& lanes) {
+    S* const numbers = &across_[path.first_number + first];
     const auto past = [&](const CouplingPath::Passed& passed, std::size_t first_meeting) {
-      const ClosureFactor& below = factors_[passed.closure];
-      std::array<S, 6> sum;
-      sum.fill(S(0.0));
+      const Closure& below = closures()[passed.closure];
+      Wrench<Pack> sum = no_wrench();
       std::size_t at = 0;
-      for (std::size_t m = 0; m < closures()[passed.closure].paths.size(); ++m) {
+      for (std::size_t m = 0; m < below.paths.size(); ++m) {
         const CouplingPath::Meeting& meeting = path.meetings[first_meeting + m];
         const CouplingPath& other = paths().all()[meeting.path];
         for (std::size_t i = 0; i < other.rows(); ++i, ++at) {
-          const S moved = product(meeting, numbers, &columns_[other.first_number + i * other.numbers]);
-          numbers[passed.at + at] = select(lanes, S(0.0) - moved, numbers[passed.at + at]);
-          for (std::size_t c = 0; c < 6; ++c) sum[c] = sum[c] + below.down[6 * at + c] * moved;
+          const S* const x = &columns_[other.first_number + i];
+          Pack moved(0.0);
+          each_shared(meeting, [&](std::size_t n, std::size_t of_other) { moved = moved + Side::load(numbers + n * path.room) * Pack(x[of_other * other.room]); });
+          Side::store(lanes, Pack(0.0) - moved, numbers + (passed.at + at) * path.room);
+          sum = sum + moved * spread<Pack>(Wrench<S>::from(&factors_[passed.closure].down[kSix * at]));
         }
       }
-      return Wrench<S>::from(sum.data());
+      return sum;
     };
-    const auto keep = [&](auto joint, std::size_t k, const Wrench<S>& y) {
-      put(joint, apply_inverse_transposed(joint, gains.inverse, model_.tree.first_block(path.slots[k]), y), lanes, numbers + path.joints[k].at);
+    const auto keep = [&](auto joint, std::size_t k, const Wrench<Pack>& y) {
+      put(joint, apply_inverse_transposed(joint, gains.inverse, model_.tree.first_block(path.slots[k]), y), lanes, path.room,
+          numbers + number_of(path, k) * path.room);
     };
-    way_up(path, constants, placement_of, gains.down, numbers_of(path, row), past, keep);
-    keep_passed(path, j, lanes, factors_[path.closure].down);
-    for (std::size_t c = 0; c < ties.coordinates(); ++c) {
-      S sum(0.0);
-      rows_.each_on_path(path, [&](Index v, std::size_t n) { sum = sum + row[n] * ties.response(c)(v); });
-      S& kept = tied_across_[(path.first_row + j) * ties.coordinates() + c];
-      kept = select(lanes, sum, kept);
-    }
+    way_up(path, constants, placement_of, gains.down, rows_of_path(path, first, jacobian), past, keep);
+    keep_passed(path, first, lanes, factors_[path.closure].down);
   }
   /// past(passed, first of its meetings): what the body where it closes gets less.
   template <class Element, class PlacementOf, class Given, class Past, class Keep>
-  void way_up(const CouplingPath& path, const BodyConstants<Element>& constants, const PlacementOf& placement_of,
-              const Field<S, 6>& gain, const Given& given, const Past& past, const Keep& keep) {
+  void way_up(const CouplingPath& path, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Field<S, 6>& gain,
+              const Given& given, const Past& past, const Keep& keep) {
     auto next = path.passed.begin();
     std::size_t meeting = closures()[path.closure].paths.size();
     impulse_along_up(
         model_.tree, constants, placement_of, gain, path.slots, path.closes_at,
         [&](Index slot) {
           for (; next != path.passed.end() && slot_of(next->closure) == slot; ++next) {
-            store(bias_, slot, load<Wrench, S>(bias_, slot) - past(*next, meeting));
+            store(bias_, slot, load<Wrench, Pack>(bias_, slot) - past(*next, meeting));
             meeting += closures()[next->closure].paths.size();
           }
         },
         given, keep, bias_);
   }
-  /// What has come to the body where a path closes, of its row j.
-  void keep_passed(const CouplingPath& path, std::size_t j, const Mask& lanes, std::vector<S>& kept) {
+  static Wrench<Pack> no_wrench() {
+    const Vec3<Pack> zero{Pack(0.0), Pack(0.0), Pack(0.0)};
+    return {zero, zero};
+  }
+  static std::size_t number_of(const CouplingPath& path, std::size_t joint) { return static_cast<std::size_t>(path.joints[joint].at); }
+  /// visit(number of the one path, number of the other) of what they share.
+  template <class Visit>
+  static void each_shared(const CouplingPath::Meeting& meeting, const Visit& visit) {
+    for (const CouplingPath::Shared& shared : meeting.shared) {
+      for (std::size_t k = 0; k < shared.count; ++k) visit(shared.at_first + k, shared.at_second + k);
+    }
+  }
+  /// What has come to the body where a path closes, of its rows from `first` on.
+  void keep_passed(const CouplingPath& path, std::size_t first, const Mask& lanes, std::vector<S>& kept) {
     const Index slot = path.closes_at;
     if (slot == 0) return;
     for (int c = 0; c < 6; ++c) {
-      S& number = kept[6 * (path.first_in_closure + j) + static_cast<std::size_t>(c)];
-      number = select(lanes, bias_(slot, c), number);
+      each_row_of(path, first, bias_(slot, c), [&](std::size_t j, const S& now) {
+        S& number = kept[kSix * (path.first_in_closure + j) + static_cast<std::size_t>(c)];
+        number = select(lanes, now, number);
+      });
     }
   }
 
-  /// S^-1 of the right side of a closure, in place.
-  void solve(std::size_t closure) {
-    ClosureFactor& kept = factors_[closure];
+  /// S^-1 of right sides of a closure, in place; R: S, or several of them in lanes.
+  template <class R>
+  void solve(std::size_t closure, R* right_sides) const {
     const std::vector<std::size_t>& rows = closures()[closure].rows;
-    for (std::size_t k = 0; k < rows.size(); ++k) kept.right_side[k] = rows_.scales()[rows[k]] * kept.right_side[k];
-    kept.solve.solve(kept.right_side);
-    for (std::size_t k = 0; k < rows.size(); ++k) kept.right_side[k] = rows_.scales()[rows[k]] * kept.right_side[k];
-  }
-  /// b times what was solved for last.
-  Wrench<S> passed_up(std::size_t closure) const {
-    const ClosureFactor& kept = factors_[closure];
-    std::array<S, 6> sum;
-    sum.fill(S(0.0));
-    for (std::size_t k = 0; k < kept.right_side.size(); ++k) {
-      for (std::size_t c = 0; c < 6; ++c) sum[c] = sum[c] + kept.up[6 * k + c] * kept.right_side[k];
-    }
-    return Wrench<S>::from(sum.data());
+    for (std::size_t k = 0; k < rows.size(); ++k) right_sides[k] = R(rows_.scales()[rows[k]]) * right_sides[k];
+    factors_[closure].solve.solve(right_sides);
+    for (std::size_t k = 0; k < rows.size(); ++k) right_sides[k] = R(rows_.scales()[rows[k]]) * right_sides[k];
   }
 
   /// S of the rows of a closure, scaled, from rows and columns, and its factor; y^T becomes S^-1 y^T.
@@ -481,32 +494,45 @@ class CouplingSweeps {
     const Closure& closes = closures()[closure];
     ClosureFactor& kept = factors_[closure];
     const std::vector<S>& scale = rows_.scales();
-    std::size_t j = 0;
     for (const std::size_t k : closes.paths) {
       const CouplingPath& path = paths().all()[k];
-      for (std::size_t row = path.first_row; row < path.last_row; ++row, ++j) {
-        const S* const y = &across_[path.first_number + (row - path.first_row) * path.numbers];
-        std::size_t c = 0;
-        for (std::size_t m = 0; m < closes.paths.size(); ++m) {
-          const CouplingPath& other = paths().all()[path.meetings[m].path];
-          for (std::size_t column = other.first_row; column < other.last_row; ++column, ++c) {
-            S sum = product(path.meetings[m], y, &columns_[other.first_number + (column - other.first_row) * other.numbers]);
-            for (std::size_t n = 0; n < coordinates; ++n) sum = sum + tied_across_[row * coordinates + n] * tied_columns_[column * coordinates + n];
-            kept.fresh.at(j, c) = scale[row] * (scale[column] * sum);
+      for (std::size_t m = 0; m < closes.paths.size(); ++m) {
+        const CouplingPath::Meeting& meeting = path.meetings[m];
+        const CouplingPath& other = paths().all()[meeting.path];
+        for (std::size_t first = 0; first < other.rows(); first += Side::count) {
+          Pack sums[6];
+          std::ranges::fill(sums, Pack(0.0));
+          each_shared(meeting, [&](std::size_t n, std::size_t of_other) {
+            const S* const y = &across_[path.first_number + n * path.room];
+            const Pack x = Side::load(&columns_[other.first_number + of_other * other.room + first]);
+            for (std::size_t j = 0; j < path.rows(); ++j) sums[j] = sums[j] + Pack(y[j]) * x;
+          });
+          for (std::size_t j = 0; j < path.rows(); ++j) {
+            const std::size_t row = path.first_row + j;
+            each_row_of(other, first, sums[j], [&](std::size_t c, const S& product) {
+              const std::size_t column = other.first_row + c;
+              S sum = product;
+              for (std::size_t n = 0; n < coordinates; ++n) sum = sum + tied_across_[row * coordinates + n] * tied_columns_[column * coordinates + n];
+              kept.fresh.at(path.first_in_closure + j, other.first_in_closure + c) = scale[row] * (scale[column] * sum);
+            });
           }
         }
-        kept.moved_by_itself[j] = select(lanes, kept.fresh.at(j, j), kept.moved_by_itself[j]);
-        S& diagonal = kept.fresh.at(j, j);
-        diagonal = diagonal + as<S>(damping);
-        if (!is_rigid(row)) diagonal = diagonal + scale[row] * scale[row] * as<S>(springs_.yield(of, row));
       }
+    }
+    for (std::size_t j = 0; j < closes.rows.size(); ++j) {
+      const std::size_t row = closes.rows[j];
+      S& diagonal = kept.fresh.at(j, j);
+      kept.moved_by_itself[j] = select(lanes, diagonal, kept.moved_by_itself[j]);
+      diagonal = diagonal + as<S>(damping);
+      if (!is_rigid(row)) diagonal = diagonal + scale[row] * scale[row] * as<S>(springs_.yield(of, row));
     }
     kept.fresh.factor();
     kept.solve.take(kept.fresh, lanes);
-    for (std::size_t c = 0; closes.slot != 0 && c < 6; ++c) {
-      for (j = 0; j < closes.rows.size(); ++j) kept.right_side[j] = kept.down[6 * j + c];
-      solve(closure);
-      for (j = 0; j < closes.rows.size(); ++j) kept.down[6 * j + c] = select(lanes, kept.right_side[j], kept.down[6 * j + c]);
+    if (closes.slot == 0) return;
+    for (std::size_t c = 0; c < 6; c += Side::count) {
+      for (std::size_t j = 0; j < closes.rows.size(); ++j) right_sides_[j] = Side::load(&kept.down[kSix * j + c]);
+      solve(closure, right_sides_.data());
+      for (std::size_t j = 0; j < closes.rows.size(); ++j) Side::store(lanes, right_sides_[j], &kept.down[kSix * j + c]);
     }
   }
   /// b S^-1 y^T.
@@ -515,11 +541,12 @@ class CouplingSweeps {
     felt.fill(S(0.0));
     if (slot_of(closure) == 0) return felt;
     const ClosureFactor& kept = factors_[closure];
-    for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c < 6; ++c) {
-        S& number = felt[static_cast<std::size_t>(row_start(r) + column_start(c))];
-        for (std::size_t k = 0; k < kept.right_side.size(); ++k) {
-          number = number + kept.up[6 * k + static_cast<std::size_t>(r)] * kept.down[6 * k + static_cast<std::size_t>(c)];
+    for (std::size_t k = 0; k < kept.right_side.size(); ++k) {
+      const S *const up = &kept.up[kSix * k], *const down = &kept.down[kSix * k];
+      for (int r = 0; r < 6; ++r) {
+        for (int c = 0; c < 6; ++c) {
+          S& number = felt[static_cast<std::size_t>(row_start(r) + column_start(c))];
+          number = number + up[r] * down[c];
         }
       }
     }
@@ -539,9 +566,29 @@ class CouplingSweeps {
           model_.tree, constants, placement_of, gains.down, slots, 0, [](Index) {},
           [&](auto joint, std::size_t k) { return load_joint(joint, tied_, model_.tree.first_v(slots[k])); },
           [&](auto joint, std::size_t k, const Wrench<S>& y) {
-            put(joint, apply_inverse_transposed(joint, gains.inverse, model_.tree.first_block(slots[k]), y), lanes, &felt_[c](model_.tree.first_v(slots[k])));
+            const Index v = model_.tree.first_v(slots[k]);
+            S now[6];
+            apply_inverse_transposed(joint, gains.inverse, model_.tree.first_block(slots[k]), y).to(now);
+            for (Index n = 0; n < velocity_count(joint); ++n) felt_[c](v + n) = select(lanes, now[n], felt_[c](v + n));
           },
-          bias_);
+          tied_bias_);
+    }
+  }
+  /// How the coordinates move by each column of a path, and how they move its rows.
+  void move_ties(const CouplingPath& path, MimicTies<S>& ties) {
+    for (std::size_t j = 0; !ties.empty() && j < path.rows(); ++j) {
+      moved_ties(ties, path.slots, [&](Index, std::size_t n) { return columns_[path.first_number + n * path.room + j]; });
+      std::ranges::copy(*tied_moved_, tied_columns_.begin() + static_cast<std::ptrdiff_t>((path.first_row + j) * pulls_.size()));
+    }
+  }
+  void cross_ties(const CouplingPath& path, const std::vector<S>& jacobian, const MimicTies<S>& ties, const Mask& lanes) {
+    for (std::size_t c = 0; c < ties.coordinates(); ++c) {
+      for (std::size_t j = 0; j < path.rows(); ++j) {
+        S sum(0.0);
+        rows_.each_on_path(path, [&](Index v, std::size_t n) { sum = sum + jacobian[path.first_velocity + n * path.room + j] * ties.response(c)(v); });
+        S& kept = tied_across_[(path.first_row + j) * ties.coordinates() + c];
+        kept = select(lanes, sum, kept);
+      }
     }
   }
   /// How these coordinates move; u(velocity row, its number among those of the slots).
@@ -549,7 +596,7 @@ class CouplingSweeps {
   void moved_ties(MimicTies<S>& ties, std::span<const Index> slots, const Innovation& u) {
     for (std::size_t c = 0; c < pulls_.size(); ++c) {
       pulls_[c] = S(0.0);
-      Index n = 0;
+      std::size_t n = 0;
       for (const Index i : slots) {
         for (Index k = 0; k < velocity_count(model_.tree.kind(i)); ++k) {
           const Index v = model_.tree.first_v(i) + k;
@@ -561,23 +608,25 @@ class CouplingSweeps {
   }
 
   const Model& model_;
-  CouplingRows<S> rows_;
+  CouplingRows<S, Side> rows_;
   std::vector<S> lambda_;
   std::vector<S> increment_;  // of lambda, by the solve made last
   std::vector<S> pull_;       // likewise, of velocities and positions
   std::vector<S> rho_;        // of the solve there is
-  std::vector<S> across_;     // of each row and number of its path: how u counts there, of closures their rho
-  std::vector<S> columns_;    // of each column likewise: u, of closures rho
+  std::vector<S> across_;     // of each number of a path and row: how u counts there, of closures their rho
+  std::vector<S> columns_;    // of each number of a path and column: u, of closures rho
   std::vector<ClosureFactor> factors_;
   CouplingSprings<S> springs_;
   Field<S> ends_;             // what springs push at the end of a step
-  Field<S, 6> bias_;          // scratch
+  Field<Pack, 6> bias_;       // scratch
+  std::vector<Pack> right_sides_;  // likewise
   // where joints are tied
   std::vector<Field<S>> felt_;                  // of each coordinate, how u counts for it
   std::vector<S> tied_across_, tied_columns_;   // of each row and coordinate
   std::vector<S> pulls_;                        // scratch
   const std::vector<S>* tied_moved_ = nullptr;  // by the solve there is
   Field<S> tied_;                               // scratch
+  Field<S, 6> tied_bias_;                       // likewise
 };
 
 }  // namespace linden

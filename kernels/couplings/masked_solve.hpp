@@ -43,14 +43,15 @@ class MaskedSolve {
     }
   }
 
-  /// b -> x.
-  void solve(std::vector<S>& b) const {
+  /// b -> x, a number a row; R: S, or several right sides in lanes.
+  template <class R>
+  void solve(R* b) const {
     for (std::size_t i = 1; i < rows_; ++i) {
-      for (std::size_t j = 0; j < i; ++j) b[i] = b[i] - matrix_[i * rows_ + j] * b[j];
+      for (std::size_t j = 0; j < i; ++j) b[i] = b[i] - R(matrix_[i * rows_ + j]) * b[j];
     }
     for (std::size_t i = rows_; i-- > 0;) {
-      for (std::size_t j = i + 1; j < rows_; ++j) b[i] = b[i] - matrix_[i * rows_ + j] * b[j];
-      b[i] = b[i] * inverse_[i];
+      for (std::size_t j = i + 1; j < rows_; ++j) b[i] = b[i] - R(matrix_[i * rows_ + j]) * b[j];
+      b[i] = b[i] * R(inverse_[i]);
     }
   }
 

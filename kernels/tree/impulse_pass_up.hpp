@@ -35,20 +35,20 @@ LINDEN_INLINE Wrench<S> apply_inverse(Joint<Kind>, const Field<S>& inverse, Inde
 }
 
 /// d^-T y
-template <JointKind Kind, class S>
-LINDEN_INLINE Wrench<S> apply_inverse_transposed(Joint<Kind>, const Field<S>& inverse, Index block, const Wrench<S>& y) {
+template <JointKind Kind, class S, class R>
+LINDEN_INLINE Wrench<R> apply_inverse_transposed(Joint<Kind>, const Field<S>& inverse, Index block, const Wrench<R>& y) {
   if constexpr (Kind == JointKind::screw) {
-    return {{inverse(block) * y.n.x, S(0.0), S(0.0)}, y.f};
+    return {{R(inverse(block)) * y.n.x, R(0.0), R(0.0)}, y.f};
   } else {
     constexpr Index n = velocity_count(Kind);
-    S in[6], out[6];
+    R in[6], out[6];
     y.to(in);
     y.to(out);
     for (Index c = 0; c < n; ++c) {
-      out[c] = inverse(block + c) * in[0];
-      for (Index r = 1; r < n; ++r) out[c] = out[c] + inverse(block + n * r + c) * in[r];
+      out[c] = R(inverse(block + c)) * in[0];
+      for (Index r = 1; r < n; ++r) out[c] = out[c] + R(inverse(block + n * r + c)) * in[r];
     }
-    return Wrench<S>::from(out);
+    return Wrench<R>::from(out);
   }
 }
 
