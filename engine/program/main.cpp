@@ -185,7 +185,7 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
 CLI::App* add_scaling(CLI::App& program, OptionTexts& texts, ScalingArguments& scaling) {
   CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
   const OptionAdder add{command};
-  add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random or humanoids");
+  add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random, humanoids, fourbars or ladder");
   add("Models", "--dofs", texts.dofs, "A..B", "least and most degrees of freedom, default 10..100000");
   add("Models", "--seed", texts.seed, "K", "each starts from random positions and speeds, default 1");
   add.spread("Models", texts);

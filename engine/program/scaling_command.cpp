@@ -32,13 +32,15 @@ namespace {
 
 using Clock = Progress::Clock;
 
-constexpr std::array<ScalingShape, 6> kShapes{{
+constexpr std::array<ScalingShape, 8> kShapes{{
     {"chain", "chain", 1},
     {"ball-chain", "ball-chain", 3},
     {"paper-chain", "paper-chain", 1},
     {"binary", "tree", 1},
     {"random", "random", 2.4},  // mean over its five kinds of joints
     {"humanoids", "humanoids", kHumanoidFreedom},
+    {"fourbars", "fourbars", 3},  // of its tree, as if loops were open
+    {"ladder", "ladder", 3},
 }};
 
 constexpr Index kMostFreedom = 10'000'000;

@@ -24,10 +24,10 @@ namespace linden {
 struct ScalingShape {
   const char* name;          // on the command line
   const char* model;         // what is before the colon in the name of a generated model
-  double degrees_of_freedom;  // of one unit: what the number behind the colon counts
+  double degrees_of_freedom;  // of one unit, what the number behind the colon counts, couplings left out
 };
 
-/// Throws InputError for a name that is none of chain, ball-chain, paper-chain, binary, random, humanoids.
+/// Throws InputError for a name that is none of chain, ball-chain, paper-chain, binary, random, humanoids, fourbars, ladder.
 const ScalingShape& scaling_shape_from(const std::string& name);
 
 struct ScalingSizes {

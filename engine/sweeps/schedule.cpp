@@ -159,7 +159,9 @@ class Writer {
   bool couplings() const { return !draft_.model.couplings.empty(); }
   /// Whether an evaluation solves for the correction, not its first half alone.
   bool solves_at_once() const { return ties() || couplings(); }
+  /// What a sweep reads where couplings close on its way, and what the second half of a solve writes.
   std::string coupled() const { return couplings() ? ", couplings" : ""; }
+  std::string pushed() const { return couplings() ? ", couplings, innovation" : ""; }
   bool springs() const { return std::ranges::any_of(draft_.model.couplings, gives_way); }
   bool newton() const { return draft_.options.solver == Solver::newton; }
   bool one_pass() const { return draft_.strategy.one_pass; }
@@ -269,7 +271,7 @@ void Writer::factor_mass_matrix(When when) {
 void Writer::solve_mass_matrix(When when, const Array& right_side, const Array& solution) {
   add(when, "impulse_pass_up", "screw, placement, mass gains" + coupled() + ", " + right_side.name, "bias, innovation" + coupled(),
       [of = right_side.of](Memory m, Slots) { solve_up(m, Coupled::velocities, m.mass_gains(), of(m)); });
-  add(when, "rate_down", "screw, placement, mass gains, innovation" + coupled(), "variation, " + solution.name + coupled(),
+  add(when, "rate_down", "screw, placement, mass gains, innovation" + coupled(), "variation, " + solution.name + pushed(),
       [of = solution.of](Memory m, Slots) {
         solve_down(m, Coupled::velocities, [&](Slots part) { pass_down_mass(m, m.mass_gains(), part, of(m)); });
       });
@@ -339,10 +341,10 @@ void Writer::residual_by_itself() {
       [](Memory m, Slots) { solve_up(m, Coupled::step, m.gains(), m.work.residual); });
   if (!solves_at_once()) return;
   if (newton()) {
-    add(When::evaluation, "increment_down", "screw, placement, motion, gains, innovation" + coupled(), "variation, increment" + coupled(),
+    add(When::evaluation, "increment_down", "screw, placement, motion, gains, innovation" + coupled(), "variation, increment" + pushed(),
         [](Memory m, Slots) { solve_down(m, Coupled::step, [&](Slots part) { pass_down(m, part, m.work.increment); }); });
   } else {
-    add(When::evaluation, "rate_down", "screw, placement, gains, innovation" + coupled(), "variation, increment" + coupled(),
+    add(When::evaluation, "rate_down", "screw, placement, gains, innovation" + coupled(), "variation, increment" + pushed(),
         [](Memory m, Slots) { solve_down(m, Coupled::step, [&](Slots part) { pass_down_mass(m, m.gains(), part, m.work.increment); }); });
   }
   if (ties()) add(When::evaluation, kCompletion, "ties, increment", "increment", [](Memory m, Slots) { m.ties.complete(m.work.increment); });
