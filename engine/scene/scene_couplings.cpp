@@ -13,12 +13,12 @@ namespace {
 
 using Keys = std::vector<std::string>;
 const Keys kBodyKeys{"type",   "name",      "between", "point",             "axis",           "second_axis",
-                     "frames", "stiffness", "damping", "turning_stiffness", "turning_damping"};
+                     "frames", "joint", "stiffness", "damping", "turning_stiffness", "turning_damping"};
 const Keys kRodKeys{"type", "name", "between", "points", "length"};
 const Keys kSpringKeys{"type", "name", "between", "points", "stiffness", "damping", "rest"};
 const Keys kGearKeys{"type", "name", "joints", "offset", "turning_stiffness", "turning_damping"};
 const Keys kAllKeys{"type",   "name",   "between", "point",     "axis",    "second_axis", "frames",            "points",
-                    "length", "joints", "offset",  "stiffness", "damping", "rest",        "turning_stiffness", "turning_damping"};
+                    "length", "joint", "joints", "offset",  "stiffness", "damping", "rest",        "turning_stiffness", "turning_damping"};
 /// A rod that gives way, by the name that people know.
 constexpr const char* kSpring = "spring";
 const std::vector<std::string> kFrameKeys{"position", "rotation", "quaternion"};
@@ -111,6 +111,7 @@ CouplingSpec read_coupling(const SceneValue& at) {
     at.fail(fmt::format("{} neither pulls nor damps", at.path()), "stiffness: in N/m, damping: in N s/m, or both; a rod is rigid", "add one");
   }
   if (const auto name = at.find("name")) spec.name = name->text("a name");
+  if (const auto joint = at.find("joint")) spec.joint = ClosingJoint{.name = joint->text("a name for the coordinate of this joint")};
   if (spec.kind != CouplingKind::gear) {
     read_bodies(at, spec);
     return spec;

@@ -46,6 +46,7 @@ class Coupler {
   }
 
   void add(const CouplingSpec& spec) {
+    if (spec.joint) check_joint(spec);
     Coupling coupling;
     coupling.kind = spec.kind;
     coupling.shift = spec.shift;
@@ -58,12 +59,25 @@ class Coupler {
     } else {
       add_frames(spec, coupling);
     }
+    if (spec.joint) {
+      model_ = with_closing_joint(std::move(model_), coupling, *spec.joint);
+      poses_ = neutral_poses(model_);
+    }
     model_.couplings.push_back(std::move(coupling));
   }
 
   Model take() { return std::move(model_); }
 
  private:
+  static void check_joint(const CouplingSpec& spec) {
+    const std::string& name = spec.name.empty() ? spec.joint->name : spec.name;
+    if (spec.kind != CouplingKind::hinge && spec.kind != CouplingKind::slider) {
+      refuse_coupling(name, fmt::format("a {} has no coordinate of its own; expected a hinge or a slider; leave joint {} out", name_of(spec.kind), quoted(spec.joint->name)));
+    }
+    if (spec.shift.gives_way() || spec.turn.gives_way()) {
+      refuse_coupling(name, "it gives way, and is to have a coordinate of its own; expected a rigid one; leave its stiffness and damping out, or the joint");
+    }
+  }
   static void check_compliance(const Coupling& coupling) {
     for (const Compliance* law : {&coupling.shift, &coupling.turn}) {
       for (const double number : {law->stiffness, law->damping}) {

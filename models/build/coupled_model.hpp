@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "layout/model.hpp"
+#include "models/build/closing_joint.hpp"
 #include "models/build/isometry.hpp"
 
 namespace linden {
@@ -41,10 +42,12 @@ struct CouplingSpec {
   std::vector<GearJoint> joints{};       // of a gear: sum of ratio q + offset = 0
   double offset = 0;
   Compliance shift{}, turn{};            // springs and dampers in the place of rows (layout/couplings.hpp); none: they are rigid
+  std::optional<ClosingJoint> joint{};   // of a hinge or slider: it gets a coordinate
 };
 
 /// The model with these couplings beside those that it has. Throws InputError for a link or joint that there is not, a coupling of a body with
-/// itself or of the world with itself, an axis of no length, two couplings of one name, a gear of joints that do not slide or turn.
+/// itself or of the world with itself, an axis of no length, two couplings of one name, a gear of joints that do not slide or turn, and what
+/// with_closing_joint does.
 Model coupled(Model model, const std::vector<CouplingSpec>& couplings);
 
 /// Poses of all bodies in the world while all coordinates are zero, by slot; joints that follow others are where they follow them to.

@@ -50,7 +50,7 @@ CouplingSpec coupling_of(const UrdfLoop& loop, const Model& model, const std::ve
 Model with_loops(Model model, const std::vector<UrdfLoop>& loops, const std::string& source_name) {
   if (loops.empty()) return model;
   const std::vector<Isometry> bodies = neutral_poses(model);
-  std::vector<CouplingSpec> couplings;
+  std::vector<std::pair<const UrdfLoop*, CouplingSpec>> couplings;
   const auto leave_out = [&](const UrdfLoop& loop, const std::string& why) {
     model.warnings.push_back(fmt::format("{}:{}: {}: {}; the robot moves as if it were not there", source_name, loop.line, loop.owner, why));
   };
@@ -65,9 +65,22 @@ Model with_loops(Model model, const std::vector<UrdfLoop>& loops, const std::str
       leave_out(loop, "its numbers are too large together");
       continue;
     }
-    couplings.push_back(std::move(spec));
+    spec.joint = loop.joint;
+    couplings.emplace_back(&loop, std::move(spec));
   }
-  return coupled(std::move(model), couplings);
+  for (auto& [loop, spec] : couplings) {
+    if (spec.joint) {
+      try {
+        model = coupled(model, {spec});
+        continue;
+      } catch (const InputError& error) {
+        model.warnings.push_back(fmt::format("{}:{}: {}: {}; its limits, damping and friction are not used", source_name, loop->line, loop->owner, error.what()));
+        spec.joint.reset();
+      }
+    }
+    model = coupled(std::move(model), {spec});
+  }
+  return model;
 }
 
 }  // namespace linden

@@ -106,6 +106,7 @@ class LoopReader {
       return;
     }
     give_name(loop);
+    if (loop.joint) loop.joint->name = loop.name;
     loops_.push_back(std::move(loop));
   }
 
@@ -151,8 +152,7 @@ class LoopReader {
       const std::string_view name = child->Name();
       const bool known = std::ranges::find(elements, name) != elements.end();
       const auto times = std::ranges::count(seen, name);
-      const bool moot = std::string_view(element.Name()).starts_with("axis") && (name == "limit" || name == "dynamics") && says_nothing(*child);
-      if (!known && times == 0 && !moot) {
+      if (!known && times == 0) {
         report_.warn(child->GetLineNum(), fmt::format("{}: <{}> within <{}> is not used", loop.owner, bare(name), element.Name()));
       } else if (known && times > (name == twice ? 1 : 0)) {
         report_.warn(child->GetLineNum(), fmt::format("{}: <{}> within <{}> is there again; not used", loop.owner, name, element.Name()));
@@ -221,14 +221,14 @@ class LoopReader {
     bool meets = false;  // where no end says where it is
     if ((a = element.FirstChildElement("link1"))) {
       b = element.FirstChildElement("link2");
-      look_at(element, loop, {"name", "type"}, {"link1", "link2", "axis"}, b ? "" : "link1");
+      look_at(element, loop, {"name", "type"}, {"link1", "link2", "axis", "limit", "dynamics"}, b ? "" : "link1");
       if (!b) b = a->NextSiblingElement("link1");
     } else if ((a = element.FirstChildElement("predecessor"))) {
-      look_at(element, loop, {"name", "type"}, {"predecessor", "successor", "predecessor_origin", "successor_origin", "axis"});
+      look_at(element, loop, {"name", "type"}, {"predecessor", "successor", "predecessor_origin", "successor_origin", "axis", "limit", "dynamics"});
       b = element.FirstChildElement("successor");
       beside_a = "predecessor_origin", beside_b = "successor_origin";
     } else if ((a = element.FirstChildElement("parent"))) {
-      look_at(element, loop, {"name", "type"}, {"parent", "child", "parent_origin", "child_origin", "origin", "axis"});
+      look_at(element, loop, {"name", "type"}, {"parent", "child", "parent_origin", "child_origin", "origin", "axis", "limit", "dynamics"});
       b = element.FirstChildElement("child");
       beside_a = "parent_origin", beside_b = "child_origin";
       meets = true;
@@ -260,6 +260,36 @@ class LoopReader {
     }
     if (axis && has_axis(loop.kind)) read_axis(*axis, loop);
     if (axis && !has_axis(loop.kind)) report_.warn(axis->GetLineNum(), fmt::format("{}: its <axis> is not used by a {}", loop.owner, name_of(loop.kind)));
+    read_joint(element, loop);
+  }
+
+  /// Limits and losses, as a <joint> has them.
+  void read_joint(const XMLElement& element, UrdfLoop& loop) const {
+    ClosingJoint joint;
+    const XMLElement *limit = element.FirstChildElement("limit"), *dynamics = element.FirstChildElement("dynamics");
+    if (limit) {
+      look_at(*limit, loop, {"lower", "upper", "effort", "velocity"}, {});
+      for (const auto& [name, value] : {std::pair("lower", &joint.limits.lower), std::pair("upper", &joint.limits.upper),
+                                        std::pair("effort", &joint.limits.effort), std::pair("velocity", &joint.limits.velocity)}) {
+        if (limit->FindAttribute(name)) *value = numbers_.one_or_infinity(loop.owner, *limit, name);
+      }
+    }
+    if (dynamics) {
+      look_at(*dynamics, loop, {"damping", "friction"}, {});
+      joint.damping = numbers_.one_or(0, loop.owner, *dynamics, "damping");
+      joint.friction = numbers_.one_or(0, loop.owner, *dynamics, "friction");
+    }
+    if (limit || dynamics) keep_joint(limit ? *limit : *dynamics, joint, loop);
+  }
+  void keep_joint(const XMLElement& at, const ClosingJoint& joint, UrdfLoop& loop) const {
+    const bool bounded = std::isfinite(joint.limits.lower) || std::isfinite(joint.limits.upper);
+    if (!bounded && joint.damping == 0 && joint.friction == 0) return;
+    if (loop.kind != CouplingKind::hinge && loop.kind != CouplingKind::slider) {
+      return report_.warn(at.GetLineNum(), fmt::format("{}: limits, damping and friction are not used of a {}", loop.owner, name_of(loop.kind)));
+    }
+    if (!(joint.damping >= 0) || !(joint.friction >= 0)) fail(at, loop, "its damping or friction is below zero", "zero or more", "correct it");
+    if (joint.limits.lower > joint.limits.upper) fail(at, loop, "its lower limit is above the upper one", "the lower one first", "correct them");
+    loop.joint = joint;
   }
 
   void read_axis(const XMLElement& axis, UrdfLoop& loop) const {
@@ -361,6 +391,7 @@ class LoopReader {
       return;
     }
     const std::optional<std::string> first = read_sdf_axis(part(element, loop, "axis"), loop, loop.axis);
+    read_sdf_joint(part(element, loop, "axis"), loop);
     loop.axis_in = first;
     loop.second_axis = loop.axis.unitOrthogonal();
     if (loop.kind != CouplingKind::universal) return;
@@ -380,22 +411,45 @@ class LoopReader {
     if (frame && *frame) loop.meeting->link = sdf_frame(pose, loop, frame);
   }
 
-  /// Of SDFormat's <limit> and <dynamics>: limits that nothing reaches, springs and losses of zero, and what drives no passive joint.
-  static bool says_nothing(const XMLElement& element) {
-    for (const XMLElement* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
-      const std::string_view name = child->Name();
-      if (name == "effort" || name == "velocity") continue;
-      const std::vector<std::string_view> words = words_of(text_within(*child));
-      const double number = words.size() == 1 ? number_in(words[0]).value_or(NAN) : NAN;
-      const bool bound = name == "lower" || name == "upper";
-      if (!(bound ? std::abs(number) >= 1e16 : number == 0)) return false;
+  /// A number of SDFormat within an element; limits of 1e16 and more are none.
+  double number_within(const XMLElement& element, const UrdfLoop& loop, const char* name, double otherwise) const {
+    constexpr double kNoLimit = 1e16;
+    const XMLElement* const says = element.FirstChildElement(name);
+    if (!says) return otherwise;
+    look_beside_text(*says, loop, {});
+    const std::vector<std::string_view> words = words_of(text_within(*says));
+    if (words.size() == 1 && (words[0].ends_with("inf") || words[0].ends_with("infinity"))) return words[0].starts_with('-') ? -INFINITY : INFINITY;
+    const double number = numbers_within(*says, loop, 1)[0];
+    return std::abs(number) >= kNoLimit ? std::copysign(INFINITY, number) : number;
+  }
+  /// Of SDFormat's <limit> and <dynamics> within an <axis>; a spring is told.
+  void read_sdf_joint(const XMLElement& axis, UrdfLoop& loop) const {
+    ClosingJoint joint;
+    const XMLElement *limit = axis.FirstChildElement("limit"), *dynamics = axis.FirstChildElement("dynamics");
+    if (limit) {
+      look_at(*limit, loop, {}, {"lower", "upper", "effort", "velocity"});
+      joint.limits.lower = number_within(*limit, loop, "lower", joint.limits.lower);
+      joint.limits.upper = number_within(*limit, loop, "upper", joint.limits.upper);
+      // what is below zero is no limit
+      for (const auto& [name, value] : {std::pair("effort", &joint.limits.effort), std::pair("velocity", &joint.limits.velocity)}) {
+        const double most = number_within(*limit, loop, name, *value);
+        if (most >= 0) *value = most;
+      }
     }
-    return true;
+    if (dynamics) {
+      look_at(*dynamics, loop, {}, {"damping", "friction", "spring_reference", "spring_stiffness"});
+      joint.damping = number_within(*dynamics, loop, "damping", 0);
+      joint.friction = number_within(*dynamics, loop, "friction", 0);
+      if (number_within(*dynamics, loop, "spring_stiffness", 0) != 0) {
+        report_.warn(dynamics->GetLineNum(), fmt::format("{}: <spring_stiffness> within <dynamics> is not used", loop.owner));
+      }
+    }
+    if (limit || dynamics) keep_joint(limit ? *limit : *dynamics, joint, loop);
   }
 
   /// Returns the frame that the axis is given in, as UrdfLoop::axis_in has it.
   std::optional<std::string> read_sdf_axis(const XMLElement& element, const UrdfLoop& loop, Vector3d& axis) const {
-    look_at(element, loop, {}, {"xyz", "use_parent_model_frame"});
+    look_at(element, loop, {}, {"xyz", "use_parent_model_frame", "limit", "dynamics"});
     const XMLElement& xyz = part(element, loop, "xyz");
     look_beside_text(xyz, loop, {"expressed_in"});
     const std::vector<double> numbers = numbers_within(xyz, loop, 3);

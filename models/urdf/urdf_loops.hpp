@@ -8,6 +8,7 @@
 //     <parent link/> <child link/>
 //       <parent_origin xyz/> <child_origin xyz/>      exporters of CAD programs, with <axis frame="parent">; what turns is as it lies at zero
 //       <origin xyz rpy/>                             the joint in the parent's frame, as in a <joint>, where both ends meet at zero
+//     <limit lower upper effort velocity/> <dynamics damping friction/>    of all of these, as in a <joint>
 //   <loop name type>                                URDF+ (Chignoli et al., arXiv 2411.19753)
 //     <predecessor link> <origin/>, <successor link> <origin/>; or <predecessor_origin/>, <successor_origin/> beside them
 //   <drake:ball_constraint>                         Drake, MultibodyPlant::AddBallConstraint
@@ -15,12 +16,13 @@
 //   <drake:linear_spring_damper>                    Drake, a spring and damper between two points; likewise, and
 //     <drake:linear_spring_damper_free_length value/>, _stiffness, _damping
 //   <gazebo> <joint name type>                      Gazebo: a joint of SDFormat inside <gazebo>
-//     <parent>, <child>, <pose relative_to> in the child's frame where nothing else is said, <axis> <xyz expressed_in>, <axis2>;
+//     <parent>, <child>, <pose relative_to> in the child's frame where nothing else is said, <axis> <xyz expressed_in> <limit> <dynamics>, <axis2>;
 //     both ends meet where all coordinates are zero
 //
 // Types: revolute, continuous, hinge; prismatic, slider; spherical, ball; fixed, weld; universal; cylindrical. Each loop becomes a coupling.
-// With a frame for each end a loop may be open at zero: it is closed by the start, see engine/assembly.hpp. What is not understood is told as
-// a warning and left out; limits, friction and damping of these joints are told too, and not used.
+// With a frame for each end a loop may be open at zero: it is closed by the start, see engine/assembly.hpp. One that turns or slides and has limits,
+// damping or friction gets a coordinate of its own (models/build/closing_joint.hpp), so that a scene can ask for them as it does of any joint.
+// What is not understood is told as a warning and left out.
 //
 // source  robots and programs as above; http://sdformat.org/spec for joints; RigidBodyLoop of Drake 1.0 for its axis, equal in both frames
 #pragma once
@@ -53,6 +55,7 @@ struct UrdfLoop {
   std::optional<std::string> axis_in{};         // a link in whose frame they are given, empty: the world; else in the joint's
   double length = 0;                            // of a spring [m]
   Compliance spring{};
+  std::optional<ClosingJoint> joint{};          // with limits, damping or friction
 };
 
 /// False for a ball, a weld and a rod.

@@ -182,7 +182,8 @@ class Maker {
   }
 
   /// Bodies are tied to each other, or to the world, as they stand at the start: as many rows as leave a coordinate or two free; now and then
-  /// one coupling twice, whose rows follow from each other. Numbers of its own, so that all else is as it would be without.
+  /// one coupling twice, whose rows follow from each other. In every other scene the first that turns or slides has a coordinate. Numbers of its
+  /// own, so that all else is as it would be without.
   void make_couplings() {
     Random random(scene_.seed * 32452843 + scene_.number);
     const Index bodies = model().tree.bodies();
@@ -215,6 +216,11 @@ class Maker {
       specs.push_back(coupling_at_start(random, poses, kind, a, b));
       specs.back().name = fmt::format("coupling{}", specs.size());
       free -= rows;
+      const bool moves = kind == CouplingKind::hinge || kind == CouplingKind::slider;
+      if (moves && scene_.number % 12 == 4 && std::ranges::none_of(specs, [](const CouplingSpec& spec) { return spec.joint.has_value(); })) {
+        specs.back().joint = ClosingJoint{.name = "closing"};
+        continue;
+      }
       if (random.uniform(0, 1) < 0.15) {
         specs.push_back(specs.back());
         specs.back().name = fmt::format("coupling{}", specs.size());
@@ -222,9 +228,27 @@ class Maker {
     }
     if (specs.empty()) return;
     auto tied = std::make_shared<const Model>(coupled(*scene_.model, specs));
-    if (starts_singular(*tied, random)) return;
+    InitialState start = start_in(*tied);
+    if (starts_singular(*tied, start.positions, random)) return;
     scene_.model = std::move(tied);
+    scene_.start = std::move(start);
     scene_.coupled = true;
+  }
+  /// The start in a model that may have a joint more, which is at zero.
+  InitialState start_in(const Model& to) const {
+    InitialState start{to.neutral(), std::vector<double>(static_cast<std::size_t>(to.tree.shape.velocities), 0.0)};
+    const Tree& tree = model().tree;
+    for (Index i = 1; i < tree.shape.slots; ++i) {
+      const auto place = std::ranges::find(to.names.body, model().names.body[static_cast<std::size_t>(i)]);
+      const auto slot = static_cast<Index>(place - to.names.body.begin());
+      for (Index k = 0; k < position_count(tree.kind(i)); ++k) {
+        start.positions[static_cast<std::size_t>(to.tree.first_q(slot) + k)] = scene_.start.positions[static_cast<std::size_t>(tree.first_q(i) + k)];
+      }
+      for (Index k = 0; k < velocity_count(tree.kind(i)); ++k) {
+        start.velocities[static_cast<std::size_t>(to.tree.first_v(slot) + k)] = scene_.start.velocities[static_cast<std::size_t>(tree.first_v(i) + k)];
+      }
+    }
+    return start;
   }
 
   /// One to three couplings that give way: springs between points, some damped, bushings, soft joints of all kinds; stretched at the start where
@@ -294,7 +318,7 @@ class Maker {
 
   /// Whether rows of couplings follow from each other at the start that do not elsewhere: a structure that gives way there at first, and then
   /// no more.
-  bool starts_singular(const Model& tied, Random& random) const {
+  bool starts_singular(const Model& tied, const std::vector<double>& positions, Random& random) const {
     const reference::PlainTree tree = reference::plain_tree(tied);
     const reference::PlainCouplings couplings(tree, tied.couplings);
     const auto rank = [&](const VectorXd& q) {
@@ -307,7 +331,7 @@ class Maker {
       factor.setThreshold(1e-6);
       return factor.compute(C).rank();
     };
-    const VectorXd start = Eigen::Map<const VectorXd>(scene_.start.positions.data(), static_cast<Eigen::Index>(scene_.start.positions.size()));
+    const VectorXd start = Eigen::Map<const VectorXd>(positions.data(), static_cast<Eigen::Index>(positions.size()));
     VectorXd away(tree.velocities);
     for (double& moved : away) moved = random.uniform(-0.5, 0.5);
     return rank(start) < rank(reference::advanced(tree, start, away));

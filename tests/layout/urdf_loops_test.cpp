@@ -10,6 +10,7 @@
 
 namespace linden::urdf_loops_test {
 using Catch::Matchers::Contains;
+using Catch::Matchers::EndsWith;
 using Catch::Matchers::StartsWith;
 using Eigen::AngleAxisd;
 using Eigen::Vector3d;
@@ -212,10 +213,42 @@ TEST_CASE("loops that are not understood are told and left out, and the robot lo
   CHECK_THROWS_WITH(parse_urdf(pair_and(wrong[0].first), "test.urdf", Base::fixed, Reading::strict), StartsWith("test.urdf:2: <loop_joint> \"l\": it names one"));
 }
 
+TEST_CASE("a loop that turns and has limits, damping or friction gets a coordinate with them") {
+  const std::string ends = "<link1 link=\"a\"/><link2 link=\"b\"/>";
+  const std::string same[] = {
+      "<loop_joint name=\"l\">" + ends + "<limit lower=\"-1\" upper=\"0.5\" effort=\"4\" velocity=\"2\"/><dynamics damping=\"0.1\" friction=\"0.2\"/></loop_joint>",
+      sdf("revolute", "<axis><xyz>0 0 1</xyz><limit><lower>-1</lower><upper>0.5</upper><effort>4</effort><velocity>2</velocity></limit>"
+                      "<dynamics><damping>0.1</damping><friction>0.2</friction></dynamics></axis>")};
+  for (const std::string& xml : same) {
+    CAPTURE(xml);
+    const Model model = parse_urdf(pair_and(xml), "test.urdf");
+    CHECK(told_of(pair_and(xml)).empty());
+    REQUIRE(model.couplings.size() == 1);
+    CHECK(model.couplings[0].kind == CouplingKind::weld);
+    REQUIRE(model.names.slot_of_joint.contains("l"));
+    const Index row = model.tree.first_v(model.names.slot_of_joint.at("l"));
+    CHECK(model.attributes.lower(row) == -1);
+    CHECK(model.attributes.upper(row) == 0.5);
+    CHECK(model.attributes.max_effort(row) == 4);
+    CHECK(model.attributes.max_velocity(row) == 2);
+    CHECK(model.attributes.damping(row) == 0.1);
+    CHECK(model.attributes.friction(row) == 0.2);
+  }
+  // nothing to tell, and nothing to keep
+  const Model plain = parse_urdf(pair_and("<loop_joint name=\"l\">" + ends + "<limit effort=\"4\" velocity=\"2\"/></loop_joint>"), "test.urdf");
+  CHECK(plain.couplings.at(0).kind == CouplingKind::hinge);
+  // a name that a joint has already: closed without
+  const std::string twice = "<loop_joint name=\"k\">" + ends + "<limit lower=\"-1\"/></loop_joint>";
+  CHECK(parse_urdf(pair_and(twice), "test.urdf").couplings.at(0).kind == CouplingKind::hinge);
+  REQUIRE(told_of(pair_and(twice)).size() == 1);
+  CHECK_THAT(told_of(pair_and(twice))[0], EndsWith("its limits, damping and friction are not used"));
+}
+
 TEST_CASE("what a loop says beside its place is told") {
   const std::string ends = "<link1 link=\"a\"/><link2 link=\"b\"/>", l = "test.urdf:2: <loop_joint> \"l\": ", g = "test.urdf:2: <joint> of <gazebo> \"l\": ";
   const std::pair<std::string, Strings> told[] = {
-      {"<loop_joint name=\"l\">" + ends + "<limit lower=\"0\"/></loop_joint>", {l + "<limit> within <loop_joint> is not used"}},
+      {"<loop_joint name=\"l\">" + ends + "<limit lower=\"-1\" soft=\"1\"/></loop_joint>", {l + "<limit> has soft=\"1\", which is not used"}},
+      {"<loop_joint name=\"l\" type=\"ball\">" + ends + "<limit lower=\"0\"/></loop_joint>", {l + "limits, damping and friction are not used of a ball"}},
       {"<loop_joint name=\"l\" colour=\"red\">" + ends + "</loop_joint>", {l + "<loop_joint> has colour=\"red\", which is not used"}},
       {"<loop_joint name=\"l\">" + ends + "<axis xyz=\"0 0 1\"/><axis xyz=\"0 1 0\"/></loop_joint>",
        {l + "<axis> within <loop_joint> is there again; not used"}},
@@ -225,7 +258,9 @@ TEST_CASE("what a loop says beside its place is told") {
                        "<dynamics><spring_reference>0</spring_reference><spring_stiffness>0</spring_stiffness></dynamics></axis>"),
        {}},
       {sdf("revolute", "<axis><xyz>0 0 1</xyz><limit><lower>-1</lower></limit><dynamics><damping>0.1</damping></dynamics></axis><physics/>"),
-       {g + "<physics> within <joint> is not used", g + "<limit> within <axis> is not used", g + "<dynamics> within <axis> is not used"}},
+       {g + "<physics> within <joint> is not used"}},
+      {sdf("revolute", "<axis><xyz>0 0 1</xyz><dynamics><spring_stiffness>3</spring_stiffness></dynamics></axis>"),
+       {g + "<spring_stiffness> within <dynamics> is not used"}},
       {"<gazebo><plugin/><joint name=\"l\" type=\"ball\"><parent>a</parent><child>b</child></joint></gazebo>",
        {"test.urdf:2: known but not simulated: 1 <gazebo>; other programs read them"}},
   };
