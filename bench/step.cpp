@@ -1,5 +1,6 @@
 // bench/step.cpp
-// Time of a whole step, converged to the default tolerance: chains and trees of any size, robots, both solvers.
+// Time of a whole step, converged to the default tolerance: chains and trees of any size, robots, both solvers; mechanisms with loops, and the
+// same cut open.
 //
 //   build/release/bench/bench_step [--benchmark_filter=chain]
 //
@@ -65,6 +66,17 @@ void add(const std::string& name, const std::function<Model()>& make) {
   }
 }
 
+/// A mechanism as it is, and without its couplings.
+void add_closed_and_open(const std::string& name, const std::function<Model()>& make) {
+  const auto open = [make] {
+    Model model = make();
+    model.couplings.clear();
+    return model;
+  };
+  benchmark::RegisterBenchmark((name + "/closed").c_str(), [=](benchmark::State& state) { step(state, make(), Solver::newton); });
+  benchmark::RegisterBenchmark((name + "/open").c_str(), [=](benchmark::State& state) { step(state, open(), Solver::newton); });
+}
+
 }  // namespace
 }  // namespace linden
 
@@ -76,6 +88,12 @@ int main(int argc, char** argv) {
   for (const char* robot : {LINDEN_MODELS_DIR "/humanoid.urdf", LINDEN_ROBOTS_DIR "/g1_29dof.urdf", LINDEN_ROBOTS_DIR "/talos.urdf"}) {
     if (!std::filesystem::exists(robot)) continue;
     add(std::filesystem::path(robot).stem().string(), [=] { return load_urdf(robot, Base::floating); });
+  }
+  for (const char* mechanism : {"ladder:10", "ladder:100", "ladder:1000", "ladder:3000", "fourbars:50", "ring:100"}) {
+    add_closed_and_open(mechanism, [=] { return generate(mechanism); });
+  }
+  for (const char* mechanism : {"gripper", "leg", "stewart"}) {
+    add_closed_and_open(mechanism, [=] { return load_urdf(fmt::format(LINDEN_MODELS_DIR "/{}.urdf", mechanism), Base::fixed); });
   }
   describe_machine();
   benchmark::Initialize(&argc, argv);
