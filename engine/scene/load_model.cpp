@@ -42,9 +42,10 @@ void require_memory(const std::string& what, double bytes) {
 
 double memory_of(const std::string& name) {
   constexpr double kBytesPerBody = 2600;      // of building and simulating chain:1000000
-  constexpr double kBytesPerPairOfRows = 16;  // of couplings: two matrices of all rows
+  constexpr double kBytesPerRow = 1000;       // of couplings, likewise of ladder:30000
+  constexpr double kBytesPerPairOfRows = 16;  // of those that are solved together: two matrices
   const GeneratedSize size = generated_size(name);
-  return size.bodies * kBytesPerBody + size.rows * size.rows * kBytesPerPairOfRows;
+  return size.bodies * kBytesPerBody + size.rows * (kBytesPerRow + size.together * kBytesPerPairOfRows);
 }
 
 void check_memory(const std::string& name) { require_memory(name, memory_of(name)); }

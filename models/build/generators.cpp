@@ -216,7 +216,7 @@ struct GeneratedKind {
   std::string_view name;
   Model (*make)(Index);
   Index least = 1;
-  double bodies = 1, rows = 0;  // of each that the number counts
+  double bodies = 1, rows = 0;  // of each that the number counts; its rows are solved together
 };
 constexpr GeneratedKind kGeneratedKinds[] = {
     {"chain", chain},
@@ -294,11 +294,11 @@ GeneratedSize generated_size(const std::string& name) {
   };
   if (parts.kind == kNet) {
     const double knots = number(parts.sides().first) * number(parts.sides().second);
-    return {2 * knots, 3 * knots};
+    return {2 * knots, 3 * knots, 3 * knots};
   }
   const GeneratedKind* kind = parts.known();
   const double count = number(parts.size);
-  return kind ? GeneratedSize{kind->bodies * count, kind->rows * count} : GeneratedSize{};
+  return kind ? GeneratedSize{kind->bodies * count, kind->rows * count, kind->rows} : GeneratedSize{};
 }
 
 }  // namespace linden

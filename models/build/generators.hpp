@@ -70,7 +70,8 @@ Model generate(const std::string& name);
 
 /// About how large the model of this name is; zeros where the name is none, or holds no number.
 struct GeneratedSize {
-  double bodies = 0, rows = 0;  // rows: of couplings
+  double bodies = 0;
+  double rows = 0, together = 0;  // of couplings; of those that are solved together (engine/sweeps/coupling_paths.hpp)
 };
 GeneratedSize generated_size(const std::string& name);
 
