@@ -2,8 +2,8 @@
 // Rows of a coupling side by side, a row in every lane: what is done along a path is done for all of them at once.
 //
 // Of one tree, of doubles, as many as a register of this compilation holds; where the lanes hold instances already, one. In memory a
-// number of all rows comes before the next number, `room` numbers in all. With five rows a ladder's factor takes half the time that it takes row
-// by row, most of which is waiting for one joint's numbers before the next joint's can begin.
+// number of all rows comes before the next number, `room` numbers in all. Row by row, most of a sweep is waiting for one joint's numbers
+// before the next joint's can begin.
 #pragma once
 
 #include <array>
