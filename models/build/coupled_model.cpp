@@ -69,10 +69,13 @@ class Coupler {
   Model take() { return std::move(model_); }
 
  private:
-  static void check_joint(const CouplingSpec& spec) {
+  void check_joint(const CouplingSpec& spec) const {
     const std::string& name = spec.name.empty() ? spec.joint->name : spec.name;
     if (spec.kind != CouplingKind::hinge && spec.kind != CouplingKind::slider) {
       refuse_coupling(name, fmt::format("a {} has no coordinate of its own; expected a hinge or a slider; leave joint {} out", name_of(spec.kind), quoted(spec.joint->name)));
+    }
+    if (model_.names.slot_of_joint.contains(spec.joint->name)) {
+      refuse_coupling(name, fmt::format("there is a joint {} already; expected a name of its own; choose another", quoted(spec.joint->name)));
     }
     if (spec.shift.gives_way() || spec.turn.gives_way()) {
       refuse_coupling(name, "it gives way, and is to have a coordinate of its own; expected a rigid one; leave its stiffness and damping out, or the joint");

@@ -153,7 +153,7 @@ TEST_CASE("a coordinate for what has none is refused") {
   CHECK_THROWS_WITH(coupled(model, {soft}), Contains("it gives way"));
   soft.shift = {};
   soft.joint = ClosingJoint{.name = "crank_joint"};
-  CHECK_THROWS_WITH(coupled(model, {soft}), Contains("crank_joint"));
+  CHECK_THROWS_WITH(coupled(model, {soft}), Contains("there is a joint \"crank_joint\" already; expected a name of its own"));
 }
 
 TEST_CASE("a scene gives the joint that closes a loop a name, and asks for effects by it") {
