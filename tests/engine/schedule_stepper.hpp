@@ -171,14 +171,14 @@ class ScheduleStepper {
         if (along) {
           in_parts_down(all, [&](Slots part) { part_of(part, sum); });
         } else {
-          sum = tree_.run(last_branch_first_, false, part_of, nothing);
+          sum = one_thread_.execute([&] { return tree_.run(last_branch_first_, false, part_of, nothing); });
         }
         break;
       case Way::up:
         if (along) {
           in_parts_up(all, [&](Slots part) { part_of(part, sum); });
         } else {
-          sum = tree_.run(last_branch_first_, false, nothing, part_of);
+          sum = one_thread_.execute([&] { return tree_.run(last_branch_first_, false, nothing, part_of); });
         }
         break;
     }
@@ -205,6 +205,7 @@ class ScheduleStepper {
 
   std::vector<Sweep> list_;
   DownAndUp<Evaluated<double>> tree_;
+  oneapi::tbb::task_arena one_thread_{1};  // sweeps of a schedule share what they find
   bool last_branch_first_ = true;
   bool refactors_ = false;  // the evaluation there is gets another factor
   bool cuts_ = false;       // of the last correction a part is taken back
