@@ -14,8 +14,8 @@
 
 namespace linden {
 
-/// In what rows are kept side by side. Whoever has them in memory has this in its name: how many they are differs from compilation to
-/// compilation.
+/// What holds rows side by side. Classes that keep rows in memory take it as a template parameter: files compiled for other processors have other
+/// registers, and must not share a class of another layout.
 template <class S>
 using RowPack = std::conditional_t<std::is_same_v<S, double>, BodyPack, S>;
 

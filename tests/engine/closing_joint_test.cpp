@@ -131,6 +131,31 @@ TEST_CASE("a link that is shared with a joint keeps its mass, and a joint to the
   CHECK(slides.tree.parent(slides.names.link.at("coupler at slide").slot) == 0);
 }
 
+TEST_CASE("the coordinate is that of the second link against the first, whichever of them is shared") {
+  // of the world against the rocker: the angle of a rocker that hangs on the world, the other way round
+  Model open = closed_at_the_ground();
+  open.couplings.clear();
+  CouplingSpec foot{.name = "foot", .kind = CouplingKind::hinge, .link_a = "rocker", .link_b = "world", .at = PointAndAxis{{3, 0, 0}, {0, 1, 0}}};
+  foot.joint = ClosingJoint{.name = "foot"};
+  Simulation shared(coupled(open, {foot}), {.step = 1e-3}), plain(four_bar(CouplingKind::hinge), {.step = 1e-3});
+  REQUIRE(shared.run(1000).ok());
+  REQUIRE(plain.run(1000).ok());
+  const double rocker = plain.positions()[static_cast<std::size_t>(position_row(plain.model(), "rocker_joint"))];
+  CHECK(std::abs(rocker) > 0.1);
+  CHECK(shared.positions()[static_cast<std::size_t>(position_row(shared.model(), "foot"))] == Approx(-rocker).margin(2e-5));
+}
+
+TEST_CASE("a joint between links that it could not move is refused") {
+  Model model = four_bar(CouplingKind::hinge);
+  model.couplings.clear();
+  for (const char* massless : {"coupler", "rocker"}) {
+    for (int k = 0; k < 10; ++k) model.constants.inertia(model.names.link.at(massless).slot, k) = 0;
+  }
+  CouplingSpec pin{.name = "pin", .kind = CouplingKind::hinge, .link_a = "coupler", .link_b = "rocker", .at = PointAndAxis{{2, 0, 2}, {0, 1, 0}}};
+  pin.joint = ClosingJoint{.name = "pin"};
+  CHECK_THROWS_WITH(coupled(model, {pin}), Contains("neither \"coupler\" nor \"rocker\" has an inertia that it could move"));
+}
+
 TEST_CASE("in a batch a joint that closes a loop moves as alone") {
   const auto model = std::make_shared<const Model>(closed_by_a_joint());
   const Effects effects = acting<JointFriction>({row_of(*model, "pin"), 1.5});
