@@ -268,8 +268,9 @@ std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
   std::vector<std::span<double>> kept = controls().memory();
   if (has_stages_) kept.push_back(before_.flat());
   if (sweeps_.reuses_factor()) {
-    const auto factor = sweeps_.factor_memory();
-    kept.insert(kept.end(), {solve_.held().numbers(), factor[0], factor[1], factor[2]});
+    kept.push_back(solve_.held().numbers());
+    const std::vector<std::span<double>> factor = sweeps_.factor_memory();
+    kept.insert(kept.end(), factor.begin(), factor.end());
   }
   return kept;
 }
@@ -310,6 +311,7 @@ bool TreeStepper<kEffects>::gains_energy(const State<double>& state, int history
 template <bool kEffects>
 Evaluated<double> TreeStepper<kEffects>::first_evaluation(State<double>& state, int history, double h, Factor factor, StepReport& report) {
   sweeps_.start(state.q, h);
+  if (history > 0 && sweeps_.guesses_multipliers()) sweeps_.guess_multipliers(extrapolation(state.history, history));
   if (unfinished_) {
     const double h_before = *unfinished_;
     unfinished_.reset();
@@ -361,6 +363,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
     unfinished_ = h;
     return;
   }
+  sweeps_.remember_multipliers();
   sweeps_.arrive(h, state);
   if constexpr (kEffects) {
     part.work.of<Ground>() -= effects_.ground_stored();

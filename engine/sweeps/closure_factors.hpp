@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -130,6 +131,15 @@ class ClosureFactors {
   const S& moved_by_itself(std::size_t row) const {
     const auto [factor, k] = place_of(row);
     return factor->moved_by_itself[k];
+  }
+  /// visit(numbers) of all that it solves with: numbers is a span.
+  template <class Visit>
+  void each(const Visit& visit) {
+    for (std::vector<S>* numbers : {&across_, &columns_}) visit(std::span(*numbers));
+    for (ClosureFactor& factor : factors_) {
+      factor.solve.each(visit);
+      for (std::vector<S>* numbers : {&factor.moved_by_itself, &factor.up, &factor.down}) visit(std::span(*numbers));
+    }
   }
   /// visit(row, inverse, moved_by_itself) of all.
   template <class Visit>

@@ -20,9 +20,11 @@
 // A loop costs what its path does, wherever it hangs: a ladder of a thousand cells, each closing at the one above, is solved in O(n). What closes
 // at the world is solved by one dense matrix, over the paths.
 //
-// Multipliers are carried times h, like all impulses of a step, and begin at zero: the residual is linear in them, so what they begin with
-// changes no correction, and a correction that is cut short needs none of them back. What has not been taken yet is found anew, to the bit, by
-// whoever evaluates the same displacement once more: lanes that wait for others.
+// Multipliers are carried times h, like all impulses of a step. The residual is linear in them, so what they begin with changes no correction that
+// is made with a factor of the step itself, and one that is cut short needs none of them back: they begin at zero. A factor of an earlier step
+// pushes along where rows were then, and is wrong by that share of what is left to push; where factors outlast steps multipliers begin with the
+// polynomial through those of the last steps, as displacements do. What has not been taken yet is found anew, to the bit, by whoever evaluates
+// the same displacement once more: lanes that wait for others.
 //
 // cost    a factor: two sweeps over the path of each row, products of rows where paths meet; a solve: numbers of all paths, twice
 // source  Andersen 1983 (RATTLE); Featherstone, Rigid Body Dynamics Algorithms, ch. 8 (loop joints), 8.5 (loops within a tree's solve)
@@ -31,6 +33,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -41,8 +46,12 @@
 #include "kernels/tree/mimic.hpp"
 #include "kernels/values/lanes_of.hpp"
 #include "layout/model.hpp"
+#include "layout/state.hpp"
 
 namespace linden {
+
+/// How long the factor of a step is to serve: till another is made, of whatever, or for steps that follow, so that others have one of their own.
+enum class Serves : std::uint8_t { till_the_next, steps_that_follow };
 
 /// Pack: what rows of a coupling are side by side in (row_lanes.hpp).
 template <class S, class Pack = RowPack<S>>
@@ -52,8 +61,12 @@ class CouplingSweeps {
   using Side = RowLanes<S, Pack>;
 
   /// yields: of each row (coupling_yields.hpp); empty where none gives way.
-  CouplingSweeps(const Model& model, std::span<const double> yields, Closing closing = Closing::nearest)
-      : model_(model), rows_(model, closing), factors_(model, rows_) {
+  CouplingSweeps(const Model& model, std::span<const double> yields, Serves serves = Serves::till_the_next, Closing closing = Closing::nearest)
+      : model_(model), rows_(model, closing), of_step_(model, rows_) {
+    if (serves == Serves::steps_that_follow && !empty()) {
+      of_others_.emplace(model, rows_);
+      history_.allocate(static_cast<Index>(rows()), S(0.0));
+    }
     for (std::vector<S>* each : {&lambda_, &increment_, &pull_}) each->assign(rows(), S(0.0));
     for (const CouplingPath& path : all()) {
       for (std::size_t row = 0; row < path.rows(); ++row) {
@@ -63,6 +76,9 @@ class CouplingSweeps {
     }
     if (gives_way()) ends_.allocate(model.tree.shape.velocities, S(0.0));
   }
+
+  CouplingSweeps(const CouplingSweeps&) = delete;
+  CouplingSweeps& operator=(const CouplingSweeps&) = delete;
 
   bool empty() const { return rows_.empty(); }
   /// Whether some row does.
@@ -80,6 +96,24 @@ class CouplingSweeps {
     std::ranges::fill(lambda_, S(0.0));
     std::ranges::fill(increment_, S(0.0));
     springs_.begin(h);
+  }
+  /// Whether steps begin with multipliers of those before: see guess.
+  bool has_history() const { return of_others_.has_value(); }
+  /// After begin: multipliers that the first evaluation takes, the last ones with these shares, latest first.
+  void guess(std::span<const double> shares) {
+    for (std::size_t row = 0; row < rows(); ++row) {
+      for (std::size_t k = 0; k < shares.size() && of_step_.inverse(row) != S(0.0); ++k) {
+        increment_[row] = increment_[row] + as<S>(shares[k]) * history_(static_cast<Index>(row), static_cast<int>(k));
+      }
+    }
+  }
+  /// The step is solved: its multipliers become the latest.
+  void remember() {
+    for (Index row = 0; has_history() && row < history_.rows(); ++row) {
+      for (int k = kHistory - 1; k > 0; --k) history_(row, k) = history_(row, k - 1);
+      const auto at = static_cast<std::size_t>(row);
+      history_(row, 0) = lambda_[at] + increment_[at];
+    }
   }
   /// Gaps at the end of motions of the joints, and how joints change them there.
   void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta) {
@@ -127,14 +161,16 @@ class CouplingSweeps {
       return is_rigid(row) ? as<S>(damping) : as<S>(damping) + scale * scale * as<S>(springs_.yield(of, row));
     };
     const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
-    if (motion != nullptr) return factors_.close(closure, jacobian, constants, here, at_end, gains, ties, lanes, added);
-    return factors_.close(closure, jacobian, constants, here, here, gains, ties, lanes, added);
+    ClosureFactors<S, Pack>& factors = factors_of(of);
+    made_last_ = &factors;
+    if (motion != nullptr) return factors.close(closure, jacobian, constants, here, at_end, gains, ties, lanes, added);
+    return factors.close(closure, jacobian, constants, here, here, gains, ties, lanes, added);
   }
 
   /// Before the first half of a solve. given: velocities that are there beside those that are solved for; null: none.
   void begin_solve(Coupled of, const Field<S>* given = nullptr) {
     if (empty()) return;
-    std::vector<S>& rho = factors_.rho();
+    std::vector<S>& rho = factors_of(of).rho();
     for (const CouplingPath& path : all()) {
       for (std::size_t row = path.first_row; row < path.last_row; ++row) {
         rho[row] = of == Coupled::velocities || of == Coupled::reading ? S(0.0) : S(0.0) - rows_.gaps()[row];
@@ -145,13 +181,13 @@ class CouplingSweeps {
   }
   /// Within up_to_closures of the first half of a solve, whose innovation, u of r, is that of the bodies beyond: of the bias, what was passed up
   /// to bodies, that of the body where it closes.
-  void yield(std::size_t closure, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
-    factors_.yield(closure, ties, innovation, bias);
+  void yield(std::size_t closure, Coupled of, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
+    factors_of(of).yield(closure, ties, innovation, bias);
   }
   /// Within down_from_closures of the second half of a solve, where it is known how the body where it closes moves: the innovation of joints
   /// beyond becomes that of r - G^T dlambda.
   void push(std::size_t closure, Coupled of, const Field<S, 6>& variation, Field<S>& innovation) {
-    factors_.push(closure, variation, innovation, of == Coupled::step ? increment_ : pull_);
+    factors_of(of).push(closure, variation, innovation, of == Coupled::step ? increment_ : pull_);
   }
 
   /// r - G^T dlambda, of the solve of a step made last.
@@ -213,7 +249,7 @@ class CouplingSweeps {
   S rounding() const {
     using std::abs;
     S sum(0.0);
-    factors_.each_row([&](std::size_t row, const S& inverse, const S& moved_by_itself) {
+    of_step_.each_row([&](std::size_t row, const S& inverse, const S& moved_by_itself) {
       const S& scale = rows_.scales()[row];
       const S size = scale * rows_.sizes()[row], pushed = (lambda_[row] + increment_[row]) / scale;
       sum = sum + size * size * abs(inverse) + pushed * pushed * abs(moved_by_itself);
@@ -233,23 +269,32 @@ class CouplingSweeps {
     return is_rigid(row) ? at_begin : springs_.whole(row, at_begin);
   }
   /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
-  auto is_held_already(std::size_t row) const { return is_rigid(row) && factors_.inverse(row) == S(0.0); }
-  const S& pivot(std::size_t row) const { return factors_.pivot(row); }
+  auto is_held_already(std::size_t row) const { return is_rigid(row) && made_last_->inverse(row) == S(0.0); }
   /// How far a unit of impulse along a row opens it, with the factor made last, loops beyond closed and others open.
-  S yield(std::size_t row) const { return factors_.moved_by_itself(row) / (rows_.scales()[row] * rows_.scales()[row]); }
+  S yield(std::size_t row) const { return made_last_->moved_by_itself(row) / (rows_.scales()[row] * rows_.scales()[row]); }
+  /// visit(numbers) of all that outlasts a step: numbers is a span.
+  template <class Visit>
+  void each_kept(const Visit& visit) {
+    of_step_.each(visit);
+    visit(history_.flat());
+  }
   const Coupling& coupling_of(std::size_t row) const { return *rows_.paths().path_of(row).coupling; }
 
  private:
   static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
   static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
 
+  ClosureFactors<S, Pack>& factors_of(Coupled of) { return of == Coupled::step || !of_others_ ? of_step_ : *of_others_; }
   std::span<const Closure> closures() const { return rows_.paths().closures(); }
   std::span<const CouplingPath> all() const { return rows_.paths().all(); }
 
   const Model& model_;
   CouplingRows<S, Side> rows_;
-  ClosureFactors<S, Pack> factors_;
+  ClosureFactors<S, Pack> of_step_;
+  std::optional<ClosureFactors<S, Pack>> of_others_;     // velocities and positions; none: the same serves for all
+  const ClosureFactors<S, Pack>* made_last_ = &of_step_;
   CouplingSprings<S> springs_;
+  Field<S, kHistory> history_;  // multipliers of the last steps, latest first; empty where no factor outlasts one
   std::vector<S> lambda_;
   std::vector<S> increment_;  // of lambda, by the solve made last
   std::vector<S> pull_;       // likewise, of velocities and positions

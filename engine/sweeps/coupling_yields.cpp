@@ -41,7 +41,7 @@ void turn_at_random(const Model& model, Random& random, Field<double>& q) {
 std::vector<double> row_yields(const Model& model, std::span<const Armature> rotors) {
   if (std::ranges::none_of(model.couplings, gives_way)) return {};
   const Tree& tree = model.tree;
-  CouplingSweeps<double> couplings(model, {}, Closing::at_world);
+  CouplingSweeps<double> couplings(model, {}, Serves::till_the_next, Closing::at_world);
   Workspace<double> work;
   work.allocate(tree.shape);
   Field<double> q, rotor;

@@ -376,7 +376,7 @@ class LaneSweeps {
   [[gnu::noinline]] void solve_closed(Coupled of, const Gains<Pack>& gains, MimicTies<Pack>& ties, const Field<Pack>& r, Down down, Field<Pack>& x) {
     couplings_.begin_solve(of);
     couplings_.up_to_closures([&](Slots part) { impulses_up(gains, r, part); },
-                              [&](std::size_t closure) { couplings_.yield(closure, ties, work_.innovation, work_.bias); });
+                              [&](std::size_t closure) { couplings_.yield(closure, of, ties, work_.innovation, work_.bias); });
     couplings_.down_from_closures([&](Slots part) { (this->*down)(gains, part, x); },
                                   [&](std::size_t closure) { couplings_.push(closure, of, work_.variation, work_.innovation); });
     if (!ties.empty()) ties.complete(x);

@@ -93,7 +93,7 @@ void solve_up(Memory m, Coupled of, const Gains<double>& gains, const Field<doub
   m.now.norm = 0;
   m.couplings.begin_solve(of);
   m.couplings.up_to_closures([&](Slots part) { pass_up(m, gains, right_side, part); },
-                             [&](std::size_t closure) { m.couplings.yield(closure, m.ties, m.work.innovation, m.work.bias); });
+                             [&](std::size_t closure) { m.couplings.yield(closure, of, m.ties, m.work.innovation, m.work.bias); });
 }
 template <class Sweep>
 void solve_down(Memory m, Coupled of, const Sweep& sweep) {
@@ -184,7 +184,14 @@ class Writer {
 };
 
 void Writer::first() {
-  if (couplings()) add(When::first, "couplings: no multipliers", "", "couplings", [](Memory m, Slots) { m.couplings.begin(m.options.step); });
+  if (couplings()) {
+    add(When::first, "couplings: first multipliers", "history, couplings", "couplings", [](Memory m, Slots) {
+      m.couplings.begin(m.options.step);
+      if (m.history == 0 || !m.couplings.has_history()) return;
+      const Extrapolation guess = extrapolation(m.state.history, m.history);
+      m.couplings.guess(std::span(guess.shares).first(static_cast<std::size_t>(guess.terms)));
+    });
+  }
   add(When::first, "momentum_target_map", "p, force", "momentum_target", [](Memory m, Slots part) {
     momentum_target_map(m.model.tree, m.options.step, m.state.p, m.work.force, part, m.work.momentum_target);
   }, Way::down);
@@ -394,6 +401,7 @@ void Writer::last() {
   if (quaternions) add(When::last, "displacement_map", "motion", "delta", find_coordinates);
   add_end_of_effects(draft_);
   if (springs()) add(When::last, "couplings: end", "couplings", "couplings", [](Memory m, Slots) { m.couplings.end(m.options.step); });
+  if (couplings()) add(When::last, "couplings: remember", "couplings", "couplings", [](Memory m, Slots) { m.couplings.remember(); });
   if (draft_.strategy.shares_rows) complete();
   add(When::last, "remember", "delta, history", "history",
       [](Memory m, Slots part) { remember(m.work.delta, rows_of(m, part), m.state.history); }, Way::down);

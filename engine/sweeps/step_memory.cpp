@@ -13,7 +13,7 @@ StepMemory::StepMemory(const Model& its_model, const Options& its_options, const
       strategy(strategy_of(its_model, its_options, its_plan)),
       constants(its_model.constants),
       ties(its_model.mimics, its_model.tree),
-      couplings(its_model, its_plan.row_yields) {
+      couplings(its_model, its_plan.row_yields, strategy.reuses_factor ? Serves::steps_that_follow : Serves::till_the_next) {
   const Shape& shape = model.tree.shape;
   state.allocate(shape);
   work.allocate(shape);

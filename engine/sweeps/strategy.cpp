@@ -27,8 +27,8 @@ Strategy strategy_of(const Model& model, const Options& options, const EffectPla
   Strategy strategy;
   strategy.gravity = options.gravity != std::array<double, 3>{0, 0, 0};
   strategy.one_pass = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && model.couplings.empty();
-  strategy.reuses_factor =
-      strategy.one_pass && options.order == 2 && options.guess == FirstGuess::extrapolation && !plan.has_states;
+  strategy.reuses_factor = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && options.order == 2 &&
+                           options.guess == FirstGuess::extrapolation && !plan.has_states;
   if (plan.any() || !strategy.one_pass) return strategy;
   strategy.order = Order::branches;
   if (options.order != 2) return strategy;

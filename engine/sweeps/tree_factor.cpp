@@ -65,7 +65,7 @@ double TreeSweeps<kEffects>::pass_residual() {
   double norm = 0;
   couplings_.up_to_closures(
       [&](Slots part) { norm += impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, part, work_.bias, work_.innovation); },
-      [&](std::size_t closure) { couplings_.yield(closure, ties_, work_.innovation, work_.bias); });
+      [&](std::size_t closure) { couplings_.yield(closure, Coupled::step, ties_, work_.innovation, work_.bias); });
   if (!solves_with_residual()) return norm;
   pass_down(work_.increment);
   if (!couplings_.empty()) {
@@ -126,7 +126,7 @@ void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<doub
   couplings_.begin_solve(of, given);
   couplings_.up_to_closures(
       [&](Slots part) { impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, part, work_.bias, work_.innovation); },
-      [&](std::size_t closure) { couplings_.yield(closure, ties_, work_.innovation, work_.bias); });
+      [&](std::size_t closure) { couplings_.yield(closure, of, ties_, work_.innovation, work_.bias); });
   couplings_.down_from_closures([&](Slots part) { rates_down(part, v); },
                                 [&](std::size_t closure) { couplings_.push(closure, of, work_.variation, work_.innovation); });
   if (!ties_.empty()) ties_.complete(v);

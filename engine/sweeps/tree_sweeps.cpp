@@ -20,7 +20,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       options_(options),
       strategy_(strategy_of(model, options, plan)),
       ties_(model.mimics, model.tree),
-      couplings_(model, plan.row_yields),
+      couplings_(model, plan.row_yields, strategy_.reuses_factor ? Serves::steps_that_follow : Serves::till_the_next),
       effects_(plan, model),
       tree_(model.tree) {
   work_.allocate(model.tree.shape);
@@ -35,7 +35,6 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
                                                  const BeforeUp& before_up) {
   report.evaluations += 1;
   if (factor == Factor::fresh) report.factorisations += 1;
-  take_multipliers();
   Evaluated<double> now;
   const auto move = [&](Slots part, Evaluated<double>& sum) {
     motions(part);
@@ -78,6 +77,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
   }
   in_parts_down(all_slots(model_.tree), [&](Slots part) { down(part, now); });
   before_up(all_slots(model_.tree), now);
+  take_multipliers();
   now.scale = now.energy;
   couplings_.find_gaps(work_.placement, work_.motion, work_.delta);
   act(now);

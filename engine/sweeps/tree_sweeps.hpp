@@ -89,6 +89,10 @@ class TreeSweeps {
     q_ = &q;
     couplings_.begin(h);
   }
+  /// Whether multipliers of couplings begin with those of the steps before; these by the shares of the first guess, after start.
+  bool guesses_multipliers() const { return couplings_.has_history(); }
+  void guess_multipliers(const Extrapolation& guess) { couplings_.guess(std::span(guess.shares).first(static_cast<std::size_t>(guess.terms))); }
+  void remember_multipliers() { couplings_.remember(); }
   /// Before the evaluations of a step with effects. scale: what Evaluated::scale gets beside the energy.
   void begin(double scale);
   Evaluated<double> evaluate(Factor factor, StepReport& report);
@@ -130,8 +134,10 @@ class TreeSweeps {
   /// Whether the factor outlasts a step: reading velocities then has one of its own.
   bool reuses_factor() const { return strategy_.reuses_factor; }
   /// The factor: part of a checkpoint where it outlasts a step.
-  std::array<std::span<double>, 3> factor_memory() {
-    return {work_.gain_up.flat(), work_.gain_down.flat(), work_.joint_inverse.flat()};
+  std::vector<std::span<double>> factor_memory() {
+    std::vector<std::span<double>> memory{work_.gain_up.flat(), work_.gain_down.flat(), work_.joint_inverse.flat()};
+    couplings_.each_kept([&](std::span<double> numbers) { memory.push_back(numbers); });
+    return memory;
   }
 
   /// M(q)^-1 p, for the positions of the last refresh; apply_mass_inverse: where the mass matrix is factored already.

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "kernels/values/scalar.hpp"
@@ -64,6 +65,12 @@ class MaskedSolve {
     each(matrix_, other.matrix_);
     each(inverse_, other.inverse_);
     each(pivot_, other.pivot_);
+  }
+
+  /// visit(numbers) of all that a factor leaves here: numbers is a span.
+  template <class Visit>
+  void each(const Visit& visit) {
+    for (std::vector<S>* numbers : {&matrix_, &inverse_, &pivot_}) visit(std::span(*numbers));
   }
 
   /// 1 / pivot of a row, zero where it is held already; the pivot itself.

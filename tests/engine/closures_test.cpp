@@ -68,7 +68,7 @@ class Solve {
     const Slots all = all_slots(tree);
     const Gains<double> gains{work_.gain_up, work_.gain_down, work_.joint_inverse};
     MimicTies<double> ties(model_.mimics, tree);
-    CouplingSweeps<double> couplings(model_, {}, closing);
+    CouplingSweeps<double> couplings(model_, {}, Serves::till_the_next, closing);
     couplings.place(work_.placement, q_);
     couplings.begin(1e-3);
     couplings.find_gaps(work_.placement, work_.motion, work_.delta);
@@ -83,7 +83,7 @@ class Solve {
     couplings.begin_solve(Coupled::step);
     couplings.up_to_closures(
         [&](Slots part) { impulse_pass_up(tree, model_.constants, work_.placement, gains, work_.residual, part, work_.bias, work_.innovation); },
-        [&](std::size_t closure) { couplings.yield(closure, ties, work_.innovation, work_.bias); });
+        [&](std::size_t closure) { couplings.yield(closure, Coupled::step, ties, work_.innovation, work_.bias); });
     couplings.down_from_closures(
         [&](Slots part) {
           increment_down<true>(tree, model_.constants, work_.placement, work_.motion, gains, work_.innovation, part, work_.variation, work_.increment);

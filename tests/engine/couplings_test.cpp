@@ -33,7 +33,7 @@ Simulation moving_four_bar(CouplingKind kind, const Options& options) {
 TEST_CASE("A four-bar moves the same, closed by five rows, three or two") {
   std::vector<std::vector<double>> ends;
   for (const CouplingKind kind : {CouplingKind::hinge, CouplingKind::ball, CouplingKind::point_on_line}) {
-    Simulation simulation = moving_four_bar(kind, {.step = 1e-3});
+    Simulation simulation = moving_four_bar(kind, {.step = 1e-3, .tolerance = 1e-13});  // at which gaps end in rounding
     double band = 0;
     const double kinetic = largest_kinetic(simulation, 2000, band);
     CHECK(band < 2e-5 * kinetic);
@@ -44,6 +44,25 @@ TEST_CASE("A four-bar moves the same, closed by five rows, three or two") {
     CHECK(ends[1][row] == Approx(ends[0][row]).margin(1e-11));
     CHECK(ends[2][row] == Approx(ends[0][row]).margin(1e-11));
   }
+}
+
+TEST_CASE("A mechanism holds its factors, and its gaps stay where the tolerance puts them") {
+  const auto largest = [](double tolerance, std::int64_t& factorisations) {
+    Simulation simulation = moving_four_bar(CouplingKind::hinge, {.step = 1e-3, .tolerance = tolerance});
+    double gap = 0;
+    for (int k = 0; k < 20; ++k) {
+      const StepsReport report = simulation.run(200);
+      REQUIRE(report.ok());
+      factorisations += report.factorisations;
+      gap = std::max(gap, worst_gap(simulation.couplings()));
+    }
+    return gap;
+  };
+  std::int64_t coarse = 0, fine = 0;
+  CHECK(largest(1e-10, coarse) < 3e-12);
+  CHECK(largest(1e-13, fine) < 4e-14);
+  CHECK(coarse < 400);   // of 4,000 steps: 204
+  CHECK(fine < 2 * 4000);
 }
 
 TEST_CASE("Steps with a loop are of second order, and of the order that is asked for") {

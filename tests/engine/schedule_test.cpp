@@ -279,6 +279,7 @@ class Watch {
     twin_.finds_end_momenta = memory_.finds_end_momenta;
     twin_.update = memory_.update;
     twin_.changed = memory_.changed;
+    twin_.share = memory_.share;
   }
 
   StepMemory& memory_;
