@@ -60,6 +60,7 @@ set(linden_public_headers
   layout/support/input_error.hpp
   layout/tree.hpp
   models/build/builder.hpp
+  models/build/cable.hpp
   models/build/closing_joint.hpp
   models/build/coupled_model.hpp
   models/build/generators.hpp

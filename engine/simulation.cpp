@@ -102,6 +102,7 @@ void Simulation::set_positions(std::span<const double> q) {
 /// A start that is open by what people round off, or more: see assemble.
 void Simulation::close_nearly_closed() {
   if (model_->couplings.empty()) return;
+  stepper_->measure_cables(state_);
   assembly_ = stepper_->openness();
   if (assembly_.relative <= kOpenStart) assembly_ = stepper_->assemble(state_);
 }

@@ -19,11 +19,12 @@ constexpr std::array kPointOnLine{along_x, along_y};
 constexpr std::array kPointOnPlane{along_z};
 constexpr std::array kRod{GapRow{GapKind::length}};
 constexpr std::array kGear{GapRow{GapKind::sum}};
+constexpr std::array kCable{GapRow{GapKind::length}};
 
 }  // namespace
 
 const char* name_of(CouplingKind kind) {
-  constexpr std::array names{"ball", "hinge", "universal", "cylindrical", "slider", "weld", "point_on_line", "point_on_plane", "rod", "gear"};
+  constexpr std::array names{"ball", "hinge", "universal", "cylindrical", "slider", "weld", "point_on_line", "point_on_plane", "rod", "gear", "cable"};
   static_assert(names.size() == kCouplingKinds);
   return names[static_cast<std::size_t>(kind)];
 }
@@ -40,6 +41,7 @@ std::span<const GapRow> rows_of(CouplingKind kind) {
     case CouplingKind::point_on_plane: return kPointOnPlane;
     case CouplingKind::rod: return kRod;
     case CouplingKind::gear: return kGear;
+    case CouplingKind::cable: return kCable;
   }
   return {};
 }

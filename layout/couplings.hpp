@@ -14,11 +14,14 @@
 //   point_on_plane  d_z = 0                        x_B in the xy plane of A     1
 //   rod             |x_B - x_A| = length                                        1
 //   gear            sum of ratio q + offset = 0, of coordinates of screws       1
+//   cable           sum of |x_k+1 - x_k| = q, through points of two bodies      1
+//                   or more; q: of a joint of its own, which is its length
 //
 // Rows may give way: springs and dampers along their gaps instead of multipliers (kernels/couplings/compliance.hpp). A rod that does is a
 // spring between two points, a weld a bushing.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -29,14 +32,14 @@
 
 namespace linden {
 
-enum class CouplingKind : std::uint8_t { ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear };
-inline constexpr int kCouplingKinds = 10;
+enum class CouplingKind : std::uint8_t { ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear, cable };
+inline constexpr int kCouplingKinds = 11;
 
 /// What a row asks for.
 enum class GapKind : std::uint8_t {
   shift,    // d along axis a of A
   product,  // cosine of the angle between axis a of A and axis b of B
-  length,   // distance beyond the length
+  length,   // distance beyond the length; of a cable beyond its coordinate
   sum,      // of coordinates
 };
 
@@ -45,10 +48,16 @@ struct GapRow {
   int a = 0, b = 0;  // axes: 0, 1, 2
 };
 
-/// Of a gear.
+/// A coordinate of a gear, or of a cable its length.
 struct GearTerm {
   Index q_row, v_row;
   double ratio;
+};
+
+/// That a cable goes through.
+struct CablePoint {
+  Index slot;                  // 0: the world
+  std::array<double, 3> at;    // [m], in the frame of the body
 };
 
 /// Of a row that gives way: force = -stiffness gap - damping d gap / dt. Both zero: it does not.
@@ -60,11 +69,12 @@ struct Compliance {
 struct Coupling {
   std::string name;
   CouplingKind kind = CouplingKind::ball;
-  Index slot_a = 0, slot_b = 0;  // 0: the world; of a gear both
+  Index slot_a = 0, slot_b = 0;  // 0: the world; of gears and cables both
   Pose frame_a{}, frame_b{};     // in the frames of the bodies
-  double length = 0;             // [m], of a rod
-  std::vector<GearTerm> terms{}; // of a gear
-  double offset = 0;             // likewise
+  double length = 0;             // [m], of a rod; of a cable that in the zero configuration
+  std::vector<GearTerm> terms{}; // of a gear; of a cable one, its length
+  double offset = 0;             // of a gear
+  std::vector<CablePoint> points{};  // of a cable, from end to end
   Compliance shift{}, turn{};    // of rows in m [N/m, N s/m]; of those that are products, near zero an angle, and of gears [N m, N m s]
 };
 

@@ -14,6 +14,9 @@ std::vector<double> Model::neutral() const {
     for (Index i = run.begin; i < run.end; ++i) q[static_cast<std::size_t>(tree.first_q(i) + last)] = 1;
   }
   for (const Mimic& mimic : mimics) q[static_cast<std::size_t>(mimic.follower_q)] = mimic.offset;
+  for (const Coupling& coupling : couplings) {
+    if (coupling.kind == CouplingKind::cable) q[static_cast<std::size_t>(coupling.terms.front().q_row)] = coupling.length;
+  }
   return q;
 }
 
@@ -55,6 +58,10 @@ std::uint64_t Model::hash() const {
     for (const GearTerm& term : coupling.terms) {
       hash.add_number(term.v_row);
       hash.add_number(term.ratio);
+    }
+    for (const CablePoint& point : coupling.points) {
+      hash.add_number(point.slot);
+      for (const double number : point.at) hash.add_number(number);
     }
   }
   return hash.value();

@@ -43,7 +43,7 @@ struct Model {
   /// Free coordinates: velocities less the mimic joints.
   Index degrees_of_freedom() const { return tree.shape.velocities - static_cast<Index>(mimics.size()); }
 
-  /// Zero configuration [nq]: zeros, identity quaternions, mimic joints at their offsets.
+  /// Zero configuration [nq]: zeros, identity quaternions, mimic joints at their offsets, cables at their lengths.
   std::vector<double> neutral() const;
 
   /// Hash of everything the motion depends on (topology, constants, mimics, couplings): a checkpoint belongs to one hash. Shapes and

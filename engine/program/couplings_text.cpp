@@ -14,7 +14,7 @@
 namespace linden {
 namespace {
 
-/// "rocker and shank", "+1 crank -2 wheel"
+/// "rocker and shank", "+1 crank -2 wheel", "world - boom - load"
 std::string between(const Model& model, const Coupling& coupling) {
   if (coupling.kind == CouplingKind::gear) {
     std::vector<std::string> joints;
@@ -24,6 +24,11 @@ std::string between(const Model& model, const Coupling& coupling) {
     return fmt::format("{}", fmt::join(joints, " "));
   }
   const auto body = [&](Index slot) { return printable(model.names.body[static_cast<std::size_t>(slot)]); };
+  if (coupling.kind == CouplingKind::cable) {
+    std::vector<std::string> bodies;
+    for (const CablePoint& point : coupling.points) bodies.push_back(body(point.slot));
+    return fmt::format("{}", fmt::join(bodies, " - "));
+  }
   return body(coupling.slot_a) + " and " + body(coupling.slot_b);
 }
 

@@ -121,8 +121,12 @@ class ModelCheck {
   }
   void check_couplings() const {
     for (const Coupling& coupling : model_.couplings) {
-      const bool gear = coupling.kind == CouplingKind::gear;
-      require(gear != coupling.terms.empty(), "a coupling without what it couples");
+      const bool cable = coupling.kind == CouplingKind::cable, gear = coupling.kind == CouplingKind::gear || cable;
+      require(gear != coupling.terms.empty() && (!cable || (coupling.terms.size() == 1 && coupling.points.size() > 1)), "a coupling without what it couples");
+      for (const CablePoint& point : coupling.points) {
+        require(point.slot == 0 || moves(point.slot), "a cable through a body that there is not");
+        for (const double number : point.at) require(std::isfinite(number), "a cable through a point that is not finite");
+      }
       for (const Index slot : {coupling.slot_a, coupling.slot_b}) require(slot == 0 || moves(slot), "a coupling of a body that there is not");
       require(gear || coupling.slot_a != coupling.slot_b, "a coupling of a body with itself");
       check_place(coupling.frame_a);
@@ -133,7 +137,7 @@ class ModelCheck {
         for (Index i = 1; i < tree_.shape.slots; ++i) {
           is_screw |= tree_.kind(i) == JointKind::screw && tree_.first_v(i) == term.v_row && tree_.first_q(i) == term.q_row;
         }
-        require(is_screw && std::isfinite(term.ratio) && term.ratio != 0, "a gear of a joint that there is not");
+        require(is_screw && std::isfinite(term.ratio) && term.ratio != 0, "a gear or cable of a joint that there is not");
       }
     }
   }

@@ -5,11 +5,12 @@
 //
 //   seen, the first line that holds                       next             alone                              in a block
 //   a body turned too far, or something is not finite     cut              up to 10 times, then take back     give up
+//                                                                          at once by a held factor
 //   - of the first guess                                  give up
 //   states of effects were updated too often              give up          60 times                           24
 //   they do not settle                                    continuation     after 5 and 20 updates             -
 //   a state of an effect changed                          update states    one at a time from the 5th on      from the 8th on
-//   the residual did not fall, is not solved              cut              up to 10 times, then take back     give up from the 2nd on; never with effects
+//   the residual did not fall, is not solved              cut              the same                           give up from the 2nd on; never with effects
 //   the correction was taken back                         refactor         give up if the factor was fresh    -
 //   the residual fell by less than 10, or a held factor   refactor         with Newton's method               -
 //     will not do; not at the floor of rounding
@@ -64,7 +65,7 @@ struct Seen {
 
 constexpr Next decide(const Policy& policy, const Seen& seen) {
   const bool can_cut = seen.corrected && policy.most_cuts > 0;
-  const Next shorter = seen.cuts < policy.most_cuts ? Next::cut : Next::take_back;
+  const Next shorter = !seen.stale && seen.cuts < policy.most_cuts ? Next::cut : Next::take_back;
   if (!seen.usable) return can_cut ? shorter : Next::give_up;
   if (seen.updates >= policy.most_updates) return Next::give_up;
   if (seen.updates == policy.first_continuation || seen.updates == policy.last_continuation) return Next::continuation;

@@ -62,6 +62,7 @@ StepReport InstanceStepper::step(double time) {
 Assembly InstanceStepper::close_nearly_closed() {
   if (model_.couplings.empty()) return {};
   refresh();
+  stepper_->measure_cables(state_);
   const Assembly open = stepper_->openness();
   return open.relative > kOpenStart ? open : stepper_->assemble(state_);
 }

@@ -63,6 +63,8 @@ class Stepper {
 
   /// Of the step taken last, of h seconds; without one no force.
   virtual std::vector<CouplingState> couplings(double h) const = 0;
+  /// Coordinates of cables brought to their lengths, at the positions of the last refresh; those whose motion is given are left alone.
+  virtual void measure_cables(State<double>& state) = 0;
   /// How far open they are at the positions of the last refresh; assemble: brings the positions to where they are closed, or least open.
   virtual Assembly openness() = 0;
   virtual Assembly assemble(State<double>& state) = 0;

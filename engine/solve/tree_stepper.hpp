@@ -49,6 +49,7 @@ class TreeStepper final : public Stepper {
   const StepImpulses& impulses() const override;
   std::vector<CouplingState> couplings(double h) const override { return sweeps_.couplings(h); }
   Assembly openness() override { return sweeps_.openness(); }
+  void measure_cables(State<double>& state) override { sweeps_.measure_cables(state.q); }
   Assembly assemble(State<double>& state) override { return sweeps_.assemble(state.q); }
   EffectControls controls() override;
   std::vector<std::span<double>> memory() override;

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "kernels/tree/articulated.hpp"
 #include "kernels/values/joints.hpp"
 
 namespace linden {
@@ -93,36 +94,52 @@ class PathMaker {
   CouplingPath make() {
     path_.coupling = &coupling_;
     path_.length = norm(coupling_.frame_a.shift) + norm(coupling_.frame_b.shift);
-    path_.yield_a = yield_of(model_, coupling_.slot_a);
-    path_.yield_b = yield_of(model_, coupling_.slot_b);
-    path_.gear_yield = 0;
+    path_.least_yield = 0;
+    find_bodies();
     mark_path();
     // where all frames are at one point, bodies are what there is to measure by
-    for (const Index slot : {coupling_.slot_a, coupling_.slot_b}) {
+    for (const Index slot : bodies_) {
       if (slot != 0) path_.length = std::max(path_.length, size_of_body(model_, slot));
     }
     list();
+    for (const Index slot : bodies_) path_.ends.push_back({number_of(slot), yield_of(model_, slot)});
     for (const GearTerm& term : coupling_.terms) add_term(term);
+    if (coupling_.kind == CouplingKind::cable) path_.least_yield = kLeastYield * mean_yield();
     return std::move(path_);
   }
 
  private:
-  /// Signs of the joints between the bodies, and where it closes; joints of a gear are where its terms are.
-  void mark_path() {
-    const auto pass = [&](Index& slot, double sign) {
-      signs_[slot] = sign;
-      const auto& placed = model_.constants.tree_placement;
-      path_.length += std::hypot(placed(slot, 9), placed(slot, 10), placed(slot, 11));
-      slot = tree_.parent(slot);
-    };
-    Index a = coupling_.slot_a, b = coupling_.slot_b;
-    while (a != b) tree_.level(a) > tree_.level(b) ? pass(a, -1) : pass(b, 1);
-    path_.closes_at = a;
-    for (const GearTerm& term : coupling_.terms) {
-      const Index slot = slot_of(term);
-      signs_[slot] = 1;
-      path_.closes_at = &term == &coupling_.terms.front() ? tree_.parent(slot) : common_ancestor(path_.closes_at, tree_.parent(slot));
+  /// Share of its mean yield that a row may have at least.
+  static constexpr double kLeastYield = 1e-6;
+
+  /// Those that are pushed: none of a gear.
+  void find_bodies() {
+    if (coupling_.kind == CouplingKind::gear) return;
+    if (coupling_.kind != CouplingKind::cable) {
+      bodies_ = {coupling_.slot_a, coupling_.slot_b};
+      return;
     }
+    for (const CablePoint& point : coupling_.points) {
+      const auto found = std::ranges::find(bodies_, point.slot);
+      path_.points.push_back(static_cast<std::size_t>(found - bodies_.begin()));
+      if (found == bodies_.end()) bodies_.push_back(point.slot);
+      path_.length += norm(point.at);
+    }
+  }
+  /// Signs of the joints between the bodies, and where it closes; joints of terms are where their coordinates are.
+  void mark_path() {
+    std::vector<Index> hung = bodies_;
+    for (const GearTerm& term : coupling_.terms) hung.push_back(tree_.parent(slot_of(term)));
+    path_.closes_at = hung.front();
+    for (const Index slot : hung) path_.closes_at = common_ancestor(path_.closes_at, slot);
+    for (const Index body : bodies_) {
+      const double sign = coupling_.kind != CouplingKind::cable && body == coupling_.slot_a ? -1 : 1;
+      for (Index slot = body; slot != path_.closes_at && signs_.emplace(slot, sign).second; slot = tree_.parent(slot)) {
+        const auto& placed = model_.constants.tree_placement;
+        path_.length += std::hypot(placed(slot, 9), placed(slot, 10), placed(slot, 11));
+      }
+    }
+    for (const GearTerm& term : coupling_.terms) signs_[slot_of(term)] = 1;
     if (at_world_) path_.closes_at = 0;
   }
   Index common_ancestor(Index a, Index b) const {
@@ -157,8 +174,6 @@ class PathMaker {
     path_.velocities = path_.numbers = static_cast<std::size_t>(at);
     path_.slots.assign(gone_through.begin(), gone_through.end());
     for (CouplingPath::Joint& joint : path_.joints) joint.above = number_of(tree_.parent(joint.slot));
-    path_.at_a = number_of(coupling_.slot_a);
-    path_.at_b = number_of(coupling_.slot_b);
   }
   Index number_of(Index slot) const {
     const auto found = std::ranges::find(path_.joints, slot, &CouplingPath::Joint::slot);
@@ -169,7 +184,15 @@ class PathMaker {
     const auto at = std::ranges::find(path_.joints, slot, &CouplingPath::Joint::slot)->at;
     path_.terms.push_back(static_cast<std::size_t>(at));
     const Eigen::Vector<double, 6> screw{0, 0, model_.constants.screw(slot, 0), 0, 0, model_.constants.screw(slot, 1)};
-    path_.gear_yield += term.ratio * term.ratio / screw.dot(felt_inertia(model_, slot) * screw);
+    path_.least_yield += term.ratio * term.ratio / screw.dot(felt_inertia(model_, slot) * screw);
+  }
+  /// Of a force on each of its bodies, over all directions.
+  double mean_yield() const {
+    double sum = 0;
+    for (const CouplingPath::End& end : path_.ends) {
+      for (const int k : {0, 1, 2}) sum += end.yields[static_cast<std::size_t>(row_start(3 + k) + column_start(3 + k))] / 3;
+    }
+    return sum;
   }
 
   const Model& model_;
@@ -177,6 +200,7 @@ class PathMaker {
   const Coupling& coupling_;
   bool at_world_;
   CouplingPath path_{};
+  std::vector<Index> bodies_;
   std::map<Index, double> signs_;
 };
 

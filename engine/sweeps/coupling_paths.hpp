@@ -1,7 +1,7 @@
 // Where a model's couplings are felt and where they close: made once, of the tree alone.
 //
-// A coupling pushes its two bodies; what the joints on the way between them, up to the nearest body that both hang on, see of that is its
-// *path*. There it closes: what its path has yielded is all that body needs to know of it, and nothing above feels a loop that is closed
+// A coupling pushes its bodies, two or more; what the joints on the way between them, up to the nearest body that all hang on, see of that is
+// its *path*. There it closes: what its path has yielded is all that body needs to know of it, and nothing above feels a loop that is closed
 // below but as inertia. Loops that close at one body and share joints close together, as one *closure*. A path may lead past closures of
 // others: there its impulses make those yield once more, as they do joints.
 //
@@ -20,12 +20,18 @@ namespace linden {
 
 struct CouplingPath {
   /// A joint that is gone through, where its velocities are among the path's, and how it moves b against a: 1 on the way to b, -1 on the way
-  /// to a, 0 above both. above: number of the joint of its parent among these, -1 where that is the body that both hang on.
+  /// to a, 0 above both; 1 on the way to any body of a cable. above: number of the joint of its parent among these, -1 where that is the body
+  /// that all hang on.
   struct Joint {
     Index slot;
     Index at;
     double sign;
     Index above;
+  };
+  /// A body that is pushed: number of its joint, -1 of the body that all hang on; how it would move were it free, wrench -> twist.
+  struct End {
+    Index at;
+    std::array<double, 36> yields;
   };
   /// A closure that is gone past, and where its rows are among the path's numbers.
   struct Passed {
@@ -55,14 +61,14 @@ struct CouplingPath {
   std::size_t velocities, on_path;    // of all joints; of those up to the last that moves b against a
   std::size_t numbers;                // velocities, and rows of closures that are passed
   std::vector<Meeting> meetings;      // with those of its closure, itself too, in their order; then with those of each closure that is passed
-  std::vector<std::size_t> terms;     // of a gear: where the velocity of each term is
-  Index at_a, at_b;                   // numbers of the joints of a and b, -1 of the body that both hang on
+  std::vector<std::size_t> terms;     // of a gear, or of a cable its length: where the velocity of each term is
   Index closes_at;                    // body, 0: the world
   std::size_t closure;                // number of the one it closes in
   std::size_t first_in_closure;       // its first row, among that one's
   double length;                      // [m] of the way from frame to frame, by which a gap is judged
-  std::array<double, 36> yield_a, yield_b;  // how the bodies would move were they free: wrench -> twist
-  double gear_yield;                  // likewise, of a gear
+  std::vector<End> ends;              // of a and b; of a cable of each of its bodies
+  std::vector<std::size_t> points;    // of a cable: which of them each point is on
+  double least_yield;                 // of a gear, how far it would move were its bodies free; of a cable, which may have no direction, the least of it
 
   std::size_t rows() const { return last_row - first_row; }
 };

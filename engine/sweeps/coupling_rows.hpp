@@ -32,6 +32,7 @@ class CouplingRows {
     std::size_t longest = 0;
     for (const CouplingPath& path : paths_.all()) longest = std::max(longest, path.joints.size());
     pose_.allocate(static_cast<Index>(longest));
+    pull_.allocate(static_cast<Index>(longest));
     for (std::vector<S>* each : {&gap_, &size_, &scale_}) each->assign(count(), S(0.0));
     for (std::vector<S>* each : {&begin_, &end_}) each->assign(paths_.velocities(), S(0.0));
     for (const CouplingPath& path : paths_.all()) {
@@ -119,6 +120,10 @@ class CouplingRows {
   }
 
  private:
+  /// Points of a cable that are no farther apart have no direction [m].
+  template <class Number>
+  static constexpr double kNoDistance = is_single<Number> ? 1e-18 : 1e-150;
+
   static Placement<S> placement_of(const Pose& pose) {
     double numbers[12];
     std::ranges::copy(pose.rotation, numbers);
@@ -134,6 +139,7 @@ class CouplingRows {
   /// asked.
   template <class PlacementOf, class DeltaOf>
   void look(const PlacementOf& placement, const DeltaOf& delta, std::vector<S>& numbers, bool scales) {
+    using std::sqrt;
     std::size_t term = 0;
     for (const CouplingPath& path : paths_.all()) {
       const Coupling& coupling = *path.coupling;
@@ -143,7 +149,7 @@ class CouplingRows {
           gap = gap + as<S>(coupling.terms[k].ratio) * (at_start_[term] + delta(coupling.terms[k].v_row));
           numbers[path.first_velocity + path.terms[k] * path.room] = as<S>(coupling.terms[k].ratio);
         }
-        if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.gear_yield));
+        if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.least_yield));
         continue;
       }
       for (std::size_t k = path.joints.size(); k-- > 0;) {
@@ -154,7 +160,12 @@ class CouplingRows {
           store(pose_, static_cast<Index>(k), on.above >= 0 ? placed_in(pose(on.above), X) : X);
         });
       }
-      const Placement<S> A = placed_in(pose(path.at_a), placement_of(coupling.frame_a)), B = placed_in(pose(path.at_b), placement_of(coupling.frame_b));
+      if (coupling.kind == CouplingKind::cable) {
+        look_along(path, at_start_[term] + delta(coupling.terms.front().v_row), numbers, scales);
+        ++term;
+        continue;
+      }
+      const Placement<S> A = placed_in(pose(path.ends[0].at), placement_of(coupling.frame_a)), B = placed_in(pose(path.ends[1].at), placement_of(coupling.frame_b));
       const std::span<const GapRow> kinds = rows_of(coupling.kind);
       std::array<Gap<S>, 6> gaps;
       for (std::size_t j = 0; j < kinds.size(); ++j) {
@@ -173,28 +184,81 @@ class CouplingRows {
           }
         });
       }
-      for (std::size_t j = 0; scales && j < kinds.size(); ++j) scale_[path.first_row + j] = scale_of(path, gaps[j], B.p);
+      for (std::size_t j = 0; scales && j < kinds.size(); ++j) {
+        S moves(0.0);
+        for (const CouplingPath::End& end : path.ends) moves = moves + moved(end, gaps[j], B.p);
+        scale_[path.first_row + j] = S(1.0) / sqrt(moves);
+      }
     }
   }
 
-  /// 1 / root of how far a row would move were its bodies free.
-  S scale_of(const CouplingPath& path, const Gap<S>& gap, const Vec3<S>& x_b) const {
-    using std::sqrt;
-    const auto moved = [&](Index number, const std::array<double, 36>& yield) {
-      const Placement<S> T = pose(number);
-      const Vec3<S> moment = gap.couple + cross(x_b - T.p, gap.force);
-      const Twist<S> w{transpose_times(T.R, moment), transpose_times(T.R, gap.force)};
-      const Wrench<S> moves = Mat6<S>::from(yield.data()) * w;  // a wrench in, a twist out: the names are those of an inertia
-      return dot(moves, w);
-    };
-    return S(1.0) / sqrt(moved(path.at_a, path.yield_a) + moved(path.at_b, path.yield_b));
+  /// The same of a cable whose bodies are placed, and whose length is to be this.
+  void look_along(const CouplingPath& path, const S& length, std::vector<S>& numbers, bool scales) {
+    using std::max, std::sqrt;
+    const Vec3<S> none{S(0.0), S(0.0), S(0.0)};
+    const std::vector<CablePoint>& points = path.coupling->points;
+    ends_.assign(path.ends.size(), {S(0.0), none, none});
+    S& gap = gap_[path.first_row] = S(0.0) - length;
+    Vec3<S> from = none;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Placement<S> T = pose(path.ends[path.points[k]].at);
+      const Vec3<S> x = T.p + T.R * Vec3<S>{as<S>(points[k].at[0]), as<S>(points[k].at[1]), as<S>(points[k].at[2])};
+      if (k > 0) {
+        const Vec3<S> d = x - from;
+        const S distance = sqrt(dot(d, d));
+        const Vec3<S> n = d / max(distance, as<S>(kNoDistance<S>));
+        gap = gap + distance;
+        const auto push = [&](std::size_t point, const Vec3<S>& force, const Vec3<S>& at) {
+          Gap<S>& end = ends_[path.points[point]];
+          end.force = end.force + force;
+          end.couple = end.couple + cross(at, force);
+        };
+        push(k - 1, none - n, from);
+        push(k, n, x);
+      }
+      from = x;
+    }
+    for (Index k = 0; k < static_cast<Index>(path.joints.size()); ++k) store(pull_, k, Wrench<S>{none, none});
+    for (std::size_t k = 0; k < ends_.size(); ++k) add_pull(path.ends[k].at, {ends_[k].couple, ends_[k].force});
+    for (std::size_t k = 0; k < path.joints.size(); ++k) {
+      const CouplingPath::Joint& on = path.joints[k];
+      if (on.sign == 0) continue;
+      const auto pull = load<Wrench, S>(pull_, static_cast<Index>(k));
+      add_pull(on.above, pull);
+      with_joint(model_.tree.kind(on.slot), [&](auto joint) {
+        S along[6];
+        gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), none, Gap<S>{gap, pull.f, pull.n}, as<S>(on.sign), along);
+        S* const to = &numbers[path.first_velocity + static_cast<std::size_t>(on.at) * path.room];
+        for (std::size_t n = 0; n < static_cast<std::size_t>(velocity_count(joint)); ++n) to[n * path.room] = along[n];
+      });
+    }
+    numbers[path.first_velocity + path.terms.front() * path.room] = S(-1.0);
+    if (!scales) return;
+    S moves = as<S>(path.least_yield);
+    for (std::size_t k = 0; k < ends_.size(); ++k) moves = moves + moved(path.ends[k], ends_[k], none);
+    scale_[path.first_row] = S(1.0) / sqrt(moves);
+  }
+  /// To what reaches the joint of this number from beyond, seen from the body that all hang on.
+  void add_pull(Index number, const Wrench<S>& pull) {
+    if (number >= 0) store(pull_, number, load<Wrench, S>(pull_, number) + pull);
+  }
+
+  /// How far a row would move by this body, were it free; x: where its force acts.
+  S moved(const CouplingPath::End& end, const Gap<S>& gap, const Vec3<S>& x) const {
+    const Placement<S> T = pose(end.at);
+    const Vec3<S> moment = gap.couple + cross(x - T.p, gap.force);
+    const Twist<S> w{transpose_times(T.R, moment), transpose_times(T.R, gap.force)};
+    const Wrench<S> moves = Mat6<S>::from(end.yields.data()) * w;  // a wrench in, a twist out: the names are those of an inertia
+    return dot(moves, w);
   }
 
   const Model& model_;
   CouplingPaths paths_;
   Field<S, 12> pose_;            // scratch: of a path, see pose()
   std::vector<S> begin_, end_;
-  std::vector<S> at_start_;      // coordinates of gears at q^k
+  std::vector<S> at_start_;      // coordinates of gears and cables at q^k
+  Field<S, 6> pull_;             // scratch: of a cable, what reaches each joint of its path from beyond
+  std::vector<Gap<S>> ends_;     // likewise, what each of its bodies feels
   std::vector<S> gap_, size_, scale_;
   bool keeps_scales_ = false;
 };

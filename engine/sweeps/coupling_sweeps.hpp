@@ -21,10 +21,10 @@
 // at the world is solved by one dense matrix, over the paths.
 //
 // Multipliers are carried times h, like all impulses of a step. The residual is linear in them, so what they begin with changes no correction that
-// is made with a factor of the step itself, and one that is cut short needs none of them back: they begin at zero. A factor of an earlier step
-// pushes along where rows were then, and is wrong by that share of what is left to push; where factors outlast steps multipliers begin with the
-// polynomial through those of the last steps, as displacements do. What has not been taken yet is found anew, to the bit, by whoever evaluates
-// the same displacement once more: lanes that wait for others.
+// is made with a factor of the step itself: they begin at zero. A factor of an earlier step pushes along where rows were then, and is wrong by
+// that share of what is left to push; where factors outlast steps multipliers begin with the polynomial through those of the last steps, as
+// displacements do. They are corrected with the displacement, whole, in part, or back again. What has not been applied is found anew, to the
+// bit, by whoever evaluates the same displacement once more: lanes that wait for others.
 //
 // cost    a factor: two sweeps over the path of each row, products of rows where paths meet; a solve: numbers of all paths, twice
 // source  Andersen 1983 (RATTLE); Featherstone, Rigid Body Dynamics Algorithms, ch. 8 (loop joints), 8.5 (loops within a tree's solve)
@@ -67,7 +67,8 @@ class CouplingSweeps {
       of_others_.emplace(model, rows_);
       history_.allocate(static_cast<Index>(rows()), S(0.0));
     }
-    for (std::vector<S>* each : {&lambda_, &increment_, &pull_}) each->assign(rows(), S(0.0));
+    for (std::vector<S>* each : {&lambda_, &increment_, &applied_, &pull_}) each->assign(rows(), S(0.0));
+    if (!empty()) unpushed_.allocate(model.tree.shape.velocities);
     for (const CouplingPath& path : all()) {
       for (std::size_t row = 0; row < path.rows(); ++row) {
         const Compliance& compliance = compliance_of(*path.coupling, rows_of(path.coupling->kind)[row]);
@@ -95,6 +96,8 @@ class CouplingSweeps {
   void begin(double h) {
     std::ranges::fill(lambda_, S(0.0));
     std::ranges::fill(increment_, S(0.0));
+    due_ = 0;
+    is_unpushed_ = true;
     springs_.begin(h);
   }
   /// Whether steps begin with multipliers of those before: see guess.
@@ -102,10 +105,13 @@ class CouplingSweeps {
   /// After begin: multipliers that the first evaluation takes, the last ones with these shares, latest first.
   void guess(std::span<const double> shares) {
     for (std::size_t row = 0; row < rows(); ++row) {
+      applied_[row] = S(0.0);
+      // what others hold already could be any number, and would grow from step to step
       for (std::size_t k = 0; k < shares.size() && of_step_.inverse(row) != S(0.0); ++k) {
-        increment_[row] = increment_[row] + as<S>(shares[k]) * history_(static_cast<Index>(row), static_cast<int>(k));
+        applied_[row] = applied_[row] + as<S>(shares[k]) * history_(static_cast<Index>(row), static_cast<int>(k));
       }
     }
+    due_ = 1;
   }
   /// The step is solved: its multipliers become the latest.
   void remember() {
@@ -198,11 +204,22 @@ class CouplingSweeps {
   void add_pull(Field<S>& p) const { rows_.push(pull_, rows_.at_begin(), p, plus); }
   /// p - G^T kappa, likewise: all that there is of the momenta of these velocities.
   void take_pull(Field<S>& p) const { rows_.push(pull_, rows_.at_begin(), p, minus); }
-  /// Of a step: before the evaluation that follows a solve, whatever becomes of the correction, in these lanes.
+  /// What the solve made last found is the correction that is applied.
+  void apply() { std::swap(increment_, applied_); }
+  /// The correction applied last, times `factor`, is due.
+  void correct(double factor) { due_ = factor; }
+  /// In an evaluation of a step: multipliers get what is due, in these lanes, and the target, which is that of the step without multipliers the first
+  /// time, what they push. Each time from there: a correction far off that is taken back leaves nothing of its rounding.
   void take_multipliers(const Mask& lanes, Field<S>& target) {
-    if (empty()) return;
-    rows_.push(increment_, rows_.at_begin(), target, [&](const S& now, const S& pushed) { return select(lanes, now + pushed, now); });
-    for (std::size_t j = 0; j < rows(); ++j) lambda_[j] = select(lanes, lambda_[j] + increment_[j], lambda_[j]);
+    if (empty() || due_ == 0) return;
+    if (is_unpushed_) std::ranges::copy(target.flat(), unpushed_.flat().begin());
+    is_unpushed_ = false;
+    for (std::size_t j = 0; j < rows(); ++j) lambda_[j] = select(lanes, lambda_[j] + as<S>(due_) * applied_[j], lambda_[j]);
+    due_ = 0;
+    for (const CouplingPath& path : all()) {
+      rows_.each_on_path(path, [&](Index v, std::size_t) { target(v) = unpushed_(v); });
+    }
+    rows_.push(lambda_, rows_.at_begin(), target, plus);
   }
 
   /// After the last evaluation of a step of h, before bodies are placed at its end: what rows that give way push there. Returns what they took [J].
@@ -262,6 +279,8 @@ class CouplingSweeps {
   std::size_t rows() const { return rows_.count(); }
   bool is_rigid(std::size_t row) const { return rows_.is_rigid(row); }
   const S& gap(std::size_t row) const { return rows_.gaps()[row]; }
+  /// How fast it opens at q^k by these velocities.
+  S opening(std::size_t row, const Field<S>& v) const { return rows_.opening_of(rows_.paths().path_of(row), row, v); }
   const S& size(std::size_t row) const { return rows_.sizes()[row]; }
   /// Times h^2; of the step solved last.
   S multiplier(std::size_t row) const {
@@ -297,6 +316,10 @@ class CouplingSweeps {
   Field<S, kHistory> history_;  // multipliers of the last steps, latest first; empty where no factor outlasts one
   std::vector<S> lambda_;
   std::vector<S> increment_;  // of lambda, by the solve made last
+  std::vector<S> applied_;    // by the correction applied last
+  double due_ = 0;            // share of it that multipliers are to get
+  Field<S> unpushed_;         // target of the residual without multipliers
+  bool is_unpushed_ = true;   // the target is that still
   std::vector<S> pull_;       // likewise, of velocities and positions
   Field<S> ends_;             // what springs push at the end of a step
 };

@@ -169,7 +169,7 @@ class LaneSweeps {
   // what solve.hpp asks
   Evaluated<Pack> evaluate(Lanes active, Lanes corrected, int round) {
     const Mask mask = L::mask(corrected);
-    if (coupled()) take_multipliers(L::mask(active));
+    if (coupled() && corrected != 0) take_multipliers(mask);
     const Evaluation<Pack> moved = is_solved() ? move_down(tree_, constants_, mask, work_) : correct_down(tree_, constants_, mask, work_);
     const Pack before = norm_;
     const Evaluated<Pack> now = evaluated(moved, active & ~corrected, corrected & slow_);
@@ -396,6 +396,8 @@ class LaneSweeps {
     return abs(norm);
   }
   [[gnu::noinline]] void take_multipliers(const Mask& lanes) {
+    couplings_.apply();
+    couplings_.correct(1);
     Field<Pack>* target = &work_.momentum_target;
     if constexpr (kEffects) {
       if (effects_.plan().joints) target = &effects_->plain_target();

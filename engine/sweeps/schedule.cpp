@@ -383,7 +383,10 @@ void Writer::correction() {
     }, Way::down);
   } else if (solves_at_once()) {
     add(When::correction, "swap_corrections", "increment, applied", "increment, applied",
-        [](Memory m, Slots) { std::ranges::swap_ranges(m.work.increment.flat(), m.work.applied.flat()); });
+        [](Memory m, Slots) {
+          std::ranges::swap_ranges(m.work.increment.flat(), m.work.applied.flat());
+          m.couplings.apply();
+        });
   } else if (newton()) {
     add(When::correction, "increment_down", "screw, placement, motion, gains, innovation", "variation, applied",
         [](Memory m, Slots part) { pass_down(m, part, m.work.applied); });
@@ -392,6 +395,7 @@ void Writer::correction() {
         [](Memory m, Slots part) { pass_down_mass(m, m.gains(), part, m.work.applied); });
   }
   add(When::correction, "correct_motion_map", "screw, applied, delta, motion", "delta, motion", [](Memory m, Slots part) {
+    m.couplings.correct(m.share);
     correct_motion_map(m.model.tree, m.constants, m.work.applied, m.share, part, m.work.delta, m.work.motion);
   }, Way::down);
 }

@@ -34,6 +34,32 @@ Assembly TreeSweeps<kEffects>::openness() {
 }
 
 template <bool kEffects>
+template <class Visit>
+void TreeSweeps<kEffects>::each_cable(const Visit& visit) const {
+  for (std::size_t row = 0; const Coupling& coupling : model_.couplings) {
+    if (coupling.kind == CouplingKind::cable) {
+      const GearTerm& length = coupling.terms.front();
+      bool is_given = false;
+      if constexpr (kEffects) {
+        is_given = std::ranges::find(effects_.plan().effects.motions, length.v_row, &JointMotion::row) != effects_.plan().effects.motions.end();
+      }
+      if (!is_given) visit(row, length);
+    }
+    row += rows_of(coupling.kind).size();
+  }
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::measure_cables(Field<double>& q) {
+  bool moved = false;
+  each_cable([&](std::size_t row, const GearTerm& length) {
+    moved = moved || couplings_.gap(row) != 0;
+    q(length.q_row) += couplings_.gap(row);
+  });
+  if (moved) refresh(q);
+}
+
+template <bool kEffects>
 Index TreeSweeps<kEffects>::widest_coupling() const {
   std::size_t row = 0;
   double widest = -1;
@@ -59,6 +85,7 @@ bool TreeSweeps<kEffects>::is_closed_to(double enough) const {
 template <bool kEffects>
 void TreeSweeps<kEffects>::close_velocities(Field<double>& v) {
   if (couplings_.empty()) return;
+  each_cable([&](std::size_t row, const GearTerm& length) { v(length.v_row) += couplings_.opening(row, v); });
   factor_for_start(Coupled::velocities);
   std::ranges::fill(work_.residual.flat(), 0.0);
   apply_mass_inverse(work_.residual, work_.increment, &v);

@@ -97,7 +97,7 @@ void TreeSweeps<kEffects>::complete() {
   valid_.evaluation = true;
 }
 
-/// What couplings pushed in the last solve joins that which the residual is to be: of effects on joints, what they start from.
+/// What couplings push joins that which the residual is to be: of effects on joints, what they start from.
 template <bool kEffects>
 void TreeSweeps<kEffects>::take_multipliers() {
   Field<double>* target = &work_.momentum_target;
@@ -214,6 +214,7 @@ Evaluated<double> TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, Sta
 
 template <bool kEffects>
 Evaluated<double> TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
+  couplings_.correct(factor);
   const auto motions = [&](Slots part) {
     place_again(part);
     correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
@@ -229,6 +230,7 @@ Evaluated<double> TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
       pass_down(work_.applied);
     } else {
       std::swap(work_.increment, work_.applied);  // pass_residual has solved already
+      couplings_.apply();
     }
     return correct(1, report);
   }

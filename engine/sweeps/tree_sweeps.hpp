@@ -63,6 +63,8 @@ class TreeSweeps {
   /// After an evaluation or a refresh: of the row that is farthest open, its gap beside the size of its mechanism, the number of its coupling.
   double widest_gap() const { return couplings_.widest_gap(); }
   Index widest_coupling() const;
+  /// Coordinates of cables brought to their lengths at the positions of the last refresh, and a refresh; not those whose motion is given.
+  void measure_cables(Field<double>& q);
   /// Velocities brought to the nearest, as the mass matrix measures, that leave couplings closed.
   void close_velocities(Field<double>& v);
   /// Closes them, or leaves them where they are least open; from the positions of the last refresh, which are brought to what is found.
@@ -206,6 +208,9 @@ class TreeSweeps {
   void factor_for_start(Coupled of, double damping = 0);
   bool is_closed_to(double enough) const;
   void close_gaps(double damping, Field<double>& q);
+  /// visit(row of its coupling, its coordinate) of all cables whose length follows.
+  template <class Visit>
+  void each_cable(const Visit& visit) const;
   template <class Added, class Action>
   void with_ties(const Added& added, const Action& action);
   void close(std::size_t closure, Coupled of, const Gains<double>& gains, double damping = 0);

@@ -21,6 +21,12 @@ std::string default_name(const CouplingSpec& spec, const Coupling& coupling) {
     for (const GearJoint& one : spec.joints) joints.push_back(one.joint);
     return fmt::format("gear of {}", fmt::join(joints, ", "));
   }
+  if (spec.kind == CouplingKind::cable) {
+    if (spec.joint) return spec.joint->name;
+    std::vector<std::string> links;
+    for (const CablePlace& place : spec.through) links.push_back(place.link.empty() ? "world" : place.link);
+    return fmt::format("cable of {}", fmt::join(links, ", "));
+  }
   const auto link = [](const std::string& name) { return name.empty() ? std::string("world") : name; };
   return fmt::format("{} of {} and {}", kind_text(coupling), link(spec.link_a), link(spec.link_b));
 }
@@ -56,10 +62,12 @@ class Coupler {
     check_compliance(coupling);
     if (spec.kind == CouplingKind::gear) {
       add_terms(spec, coupling);
+    } else if (spec.kind == CouplingKind::cable) {
+      add_cable(spec, coupling);
     } else {
       add_frames(spec, coupling);
     }
-    if (spec.joint) {
+    if (spec.joint && spec.kind != CouplingKind::cable) {
       model_ = with_closing_joint(std::move(model_), coupling, *spec.joint);
       poses_ = neutral_poses(model_);
     }
@@ -71,14 +79,17 @@ class Coupler {
  private:
   void check_joint(const CouplingSpec& spec) const {
     const std::string& name = spec.name.empty() ? spec.joint->name : spec.name;
-    if (spec.kind != CouplingKind::hinge && spec.kind != CouplingKind::slider) {
-      refuse_coupling(name, fmt::format("a {} has no coordinate of its own; expected a hinge or a slider; leave joint {} out", name_of(spec.kind), quoted(spec.joint->name)));
+    if (spec.kind != CouplingKind::hinge && spec.kind != CouplingKind::slider && spec.kind != CouplingKind::cable) {
+      refuse_coupling(name, fmt::format("a {} has no coordinate of its own; expected a hinge, a slider or a cable; leave joint {} out", name_of(spec.kind), quoted(spec.joint->name)));
     }
-    if (model_.names.slot_of_joint.contains(spec.joint->name)) {
-      refuse_coupling(name, fmt::format("there is a joint {} already; expected a name of its own; choose another", quoted(spec.joint->name)));
-    }
+    check_name(name, spec.joint->name);
     if (spec.shift.gives_way() || spec.turn.gives_way()) {
       refuse_coupling(name, "it gives way, and is to have a coordinate of its own; expected a rigid one; leave its stiffness and damping out, or the joint");
+    }
+  }
+  void check_name(const std::string& coupling, const std::string& joint) const {
+    if (model_.names.slot_of_joint.contains(joint)) {
+      refuse_coupling(coupling, fmt::format("there is a joint {} already; expected a name of its own; choose another", quoted(joint)));
     }
   }
   static void check_compliance(const Coupling& coupling) {
@@ -140,6 +151,15 @@ class Coupler {
     if (!(coupling.length > 0) || !std::isfinite(coupling.length)) {
       refuse_coupling(coupling.name, fmt::format("its length is {} m; expected more than zero; two points that are one are a ball joint", coupling.length));
     }
+  }
+
+  void add_cable(const CouplingSpec& spec, Coupling& coupling) {
+    if (coupling.shift.gives_way()) refuse_coupling(coupling.name, "a cable stretches by a spring on its length; expected no stiffness or damping of its row");
+    for (const CablePlace& place : spec.through) place_of(coupling.name, place.link);
+    const ClosingJoint length = spec.joint.value_or(ClosingJoint{.name = coupling.name});
+    if (!spec.joint) check_name(coupling.name, length.name);
+    model_ = with_cable_length(std::move(model_), coupling, spec.through, length);
+    poses_ = neutral_poses(model_);
   }
 
   void add_terms(const CouplingSpec& spec, Coupling& coupling) const {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "layout/model.hpp"
+#include "models/build/cable.hpp"
 #include "models/build/closing_joint.hpp"
 #include "models/build/isometry.hpp"
 
@@ -41,13 +42,14 @@ struct CouplingSpec {
   double length = 0;                     // of a rod [m]; 0: as far apart as both points are while all coordinates are zero
   std::vector<GearJoint> joints{};       // of a gear: sum of ratio q + offset = 0
   double offset = 0;
+  std::vector<CablePlace> through{};     // points of a cable, from end to end
   Compliance shift{}, turn{};            // springs and dampers in the place of rows (layout/couplings.hpp); none: they are rigid
-  std::optional<ClosingJoint> joint{};   // of a hinge or slider: it gets a coordinate
+  std::optional<ClosingJoint> joint{};   // of a hinge or slider: it gets a coordinate; of a cable its length, called as the cable where it is not given
 };
 
 /// The model with these couplings beside those that it has. Throws InputError for a link or joint that there is not, a coupling of a body with
 /// itself or of the world with itself, an axis of no length, two couplings of one name, a gear of joints that do not slide or turn, and what
-/// with_closing_joint does.
+/// with_closing_joint and with_cable_length do.
 Model coupled(Model model, const std::vector<CouplingSpec>& couplings);
 
 /// Poses of all bodies in the world while all coordinates are zero, by slot; joints that follow others are where they follow them to.

@@ -9,6 +9,7 @@
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
 #include "models/build/origin_inertia.hpp"
+#include "models/build/vectors.hpp"
 #include "models/shapes/mesh_path.hpp"
 
 namespace linden {
@@ -255,8 +256,12 @@ class Merger {
     for (Coupling coupling : from.couplings) {
       coupling.name = prefixed(part, coupling.name);
       for (const auto& [slot, frame] : {std::pair(&coupling.slot_a, &coupling.frame_a), std::pair(&coupling.slot_b, &coupling.frame_b)}) {
-        if (*slot == 0 && coupling.kind != CouplingKind::gear) *frame = pose_of(ground_[part].pose * isometry(*frame));
+        if (*slot == 0 && coupling.terms.empty()) *frame = pose_of(ground_[part].pose * isometry(*frame));
         *slot = carrying_slot(part, *slot);
+      }
+      for (CablePoint& point : coupling.points) {
+        if (point.slot == 0) point.at = array_of(ground_[part].pose * vector_of(point.at));
+        point.slot = carrying_slot(part, point.slot);
       }
       for (GearTerm& term : coupling.terms) {
         const Index slot = slot_of(part, slot_of_row(from.tree, term.v_row));

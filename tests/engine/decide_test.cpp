@@ -47,6 +47,8 @@ const Row table[] = {
     {"after the factor was made anew", alone, {.slow = true, .fresh = true, .corrections = 1}, Next::correct},
     {"a correction that makes it worse", alone, {.corrected = true, .slow = true, .corrections = 3}, Next::cut},
     {"one that cuts do not help", alone, {.corrected = true, .slow = true, .corrections = 3, .cuts = 10}, Next::take_back},
+    {"a held factor makes it worse", alone, {.corrected = true, .slow = true, .stale = true, .corrections = 1}, Next::take_back},
+    {"a held factor turns a body too far", alone, {.usable = false, .corrected = true, .slow = true, .stale = true, .corrections = 1}, Next::take_back},
     {"taken back, with an old factor", alone, {.taken_back = true, .slow = true, .corrections = 3, .cuts = 10}, Next::refactor},
     {"taken back, with a fresh one", alone, {.taken_back = true, .slow = true, .fresh = true, .corrections = 3}, Next::give_up},
     {"taken back, to the floor", alone, {.solved = true, .at_floor = true, .taken_back = true, .slow = true, .fresh = true}, Next::accept},

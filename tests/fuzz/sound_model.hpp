@@ -37,7 +37,7 @@ inline void require_sound(const Model& model) {
   }
   for (const Coupling& coupling : model.couplings) {
     require(finite(coupling.frame_a) && finite(coupling.frame_b), "the frames of a coupling");
-    require(coupling.kind == CouplingKind::gear || coupling.slot_a != coupling.slot_b, "a coupling of a body with itself");
+    require(!coupling.terms.empty() || coupling.slot_a != coupling.slot_b, "a coupling of a body with itself");
   }
   for (const auto& [link, place] : model.names.link) {
     require(place.slot >= 0 && place.slot < tree.shape.slots && finite(place.in_body), "the place of a link");
