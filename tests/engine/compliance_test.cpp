@@ -312,39 +312,6 @@ TEST_CASE("Springs between bodies are of the order that is asked for, and damper
   CHECK_THROWS_WITH(Simulation(two_balls(50, 1), fourth), Catch::Contains("the damping of coupling \"spring\""));
 }
 
-TEST_CASE("Andrews' squeezer comes to its published reference, with errors of second order") {
-  const Model model = squeezer();
-  const std::vector<std::pair<std::string, double>> start{{"K1", -0.0617138900142764496}, {"K2", 0},
-                                                          {"K3", 0.455279819163070380},   {"K4", 0.222668390165885885},
-                                                          {"K5", 0.487364979543842550},   {"K6", -0.222668390165885885},
-                                                          {"K7", 1.23054744454982119}};
-  const auto row = [&](const std::string& link) { return static_cast<std::size_t>(model.tree.first_v(model.names.slot_of_joint.at(link + "_joint"))); };
-  Effects effects;
-  JointTorque drive;
-  drive.row = static_cast<Index>(row("K1"));
-  drive.force = {{0}, {0.033}};
-  effects.torques.push_back(drive);
-  const auto end = [&](double h) {
-    Simulation simulation(model, weightless(h), effects);
-    std::vector<double> q(7);
-    for (const auto& [link, angle] : start) q[row(link)] = angle;
-    simulation.set_positions(q);
-    const StepsReport report = simulation.run(std::llround(0.03 / h));
-    REQUIRE(report.ok());
-    return std::vector<double>(simulation.positions().begin(), simulation.positions().end());
-  };
-  const std::vector<double> whole = end(2e-5), half = end(1e-5);
-  CHECK(half[row("K1")] == Approx(15.81077119629904).margin(1e-4));
-  CHECK(half[row("K2")] == Approx(-15.75637105984298).margin(1e-4));
-  CHECK(half[row("K3")] == Approx(0.04082224013073101).margin(1e-4));
-  CHECK(half[row("K4")] == Approx(-0.5347301163226948).margin(1e-4));
-  CHECK(half[row("K5")] == Approx(0.5244099658805304).margin(1e-4));
-  CHECK(half[row("K6")] == Approx(0.5347301163226948).margin(1e-4));
-  CHECK(half[row("K7")] == Approx(1.048080741042263).margin(1e-4));
-  const auto error = [&](const std::vector<double>& q) { return q[row("K1")] - 15.81077119629904; };
-  CHECK(error(whole) / error(half) == Approx(4).epsilon(0.1));
-}
-
 TEST_CASE("What is no spring is refused by name") {
   CHECK_THROWS_WITH(two_balls(-1, 0), Catch::Contains("\"spring\"") && Catch::Contains("-1"));
   TreeBuilder builder("one");

@@ -70,7 +70,7 @@ Simulation simulation_of(const Scenario& scenario) {
   return simulation;
 }
 
-RunRecord run(Simulation& simulation, std::int64_t steps, int every) {
+RunRecord run(Simulation& simulation, std::int64_t steps, int every, const std::function<void(Simulation&)>& watch) {
   RunRecord record;
   record.drift = EnergyDrift(steps / every + 1);
   record.momentum = MomentumDrift::of(simulation);
@@ -86,6 +86,10 @@ RunRecord run(Simulation& simulation, std::int64_t steps, int every) {
     record.energy_gain = std::max(record.energy_gain, change);
     if (std::isnan(change)) record.energy_error = change;
     if (record.momentum) record.momentum->add(simulation, energy);
+    for (const CouplingState& coupling : simulation.couplings()) {
+      for (const double gap : coupling.gaps) record.gap = std::max(record.gap, std::abs(gap));
+    }
+    if (watch) watch(simulation);
   };
   look();
   for (std::int64_t k = 0; k < steps; ++k) {

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -56,10 +57,11 @@ struct RunRecord {
   double energy_gain = 0;   // largest H - H at the start [J]
   double second_order = 0;  // see above [J]; the largest over the steps looked at
   double turn = 0;          // of a body in one step, the largest [rad]
+  double gap = 0;           // of couplings, the largest of any row [m, cosine of an angle]
 };
 
-/// Runs to the end, or to the first step that fails.
-RunRecord run(Simulation& simulation, std::int64_t steps, int every = 1);
+/// Runs to the end, or to the first step that fails. watch: called at every look.
+RunRecord run(Simulation& simulation, std::int64_t steps, int every = 1, const std::function<void(Simulation&)>& watch = {});
 RunRecord run(const Scenario& scenario);
 
 /// Every step converged; the energy error is one of second order and, where the run is long enough to tell, without slope.
