@@ -16,6 +16,7 @@
 #include "engine/simulation.hpp"
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
+#include "tests/engine/linkage_humanoid.hpp"
 
 namespace linden {
 namespace {
@@ -23,8 +24,8 @@ namespace {
 constexpr std::int64_t kTogether = 10;
 constexpr std::int64_t kEpisode = 1000;  // steps from the random start, then from there again
 
-void step(benchmark::State& state, const Model& model, Solver solver) {
-  Simulation simulation(model, {.step = 1e-3, .solver = solver});
+void step(benchmark::State& state, const Model& model, Solver solver, double length = 1e-3) {
+  Simulation simulation(model, {.step = length, .solver = solver});
   const InitialState start = random_state(model, 1, 0.1);
   simulation.set_positions(start.positions);
   simulation.set_velocities(start.velocities);
@@ -66,15 +67,15 @@ void add(const std::string& name, const std::function<Model()>& make) {
   }
 }
 
-/// A mechanism as it is, and without its couplings.
-void add_closed_and_open(const std::string& name, const std::function<Model()>& make) {
+/// A mechanism as it is, and without its couplings, in steps of this length [s].
+void add_closed_and_open(const std::string& name, const std::function<Model()>& make, double length = 1e-3) {
   const auto open = [make] {
     Model model = make();
     model.couplings.clear();
     return model;
   };
-  benchmark::RegisterBenchmark((name + "/closed").c_str(), [=](benchmark::State& state) { step(state, make(), Solver::newton); });
-  benchmark::RegisterBenchmark((name + "/open").c_str(), [=](benchmark::State& state) { step(state, open(), Solver::newton); });
+  benchmark::RegisterBenchmark((name + "/closed").c_str(), [=](benchmark::State& state) { step(state, make(), Solver::newton, length); });
+  benchmark::RegisterBenchmark((name + "/open").c_str(), [=](benchmark::State& state) { step(state, open(), Solver::newton, length); });
 }
 
 }  // namespace
@@ -92,6 +93,11 @@ int main(int argc, char** argv) {
   for (const char* mechanism : {"ladder:10", "ladder:100", "ladder:1000", "ladder:3000", "fourbars:50", "ring:100"}) {
     add_closed_and_open(mechanism, [=] { return generate(mechanism); });
   }
+  for (const Index links : {100, 1000}) {
+    // of 12.7 mm, too short for a millisecond
+    add_closed_and_open(fmt::format("roller-chain:{}", links), [=] { return roller_chain(links); }, 1e-4);
+  }
+  add_closed_and_open("humanoid_with_six_four-bars", [] { return linkage_humanoid(Base::floating); });
   for (const char* mechanism : {"gripper", "leg", "stewart"}) {
     add_closed_and_open(mechanism, [=] { return load_urdf(fmt::format(LINDEN_MODELS_DIR "/{}.urdf", mechanism), Base::fixed); });
   }

@@ -32,9 +32,10 @@ namespace linden {
 namespace {
 
 constexpr const char* kSceneHelp =
-    "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, net:AxB";
+    "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, "
+    "roller-chain:N, net:AxB";
 constexpr const char* kModelHelp =
-    "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, net:AxB";
+    "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, roller-chain:N, net:AxB";
 
 /// An empty text is how the code says that an option is absent; one that is written out is a slip, such as of a variable in a script.
 std::string filled(const std::string& text) {
@@ -185,7 +186,8 @@ CLI::App* add_rollout(CLI::App& program, OptionTexts& texts, RolloutArguments& r
 CLI::App* add_scaling(CLI::App& program, OptionTexts& texts, ScalingArguments& scaling) {
   CLI::App* command = program.add_subcommand("scaling", "Measure how the time of a step grows with the size of the model.");
   const OptionAdder add{command};
-  add("Models", "--shape", texts.shape, "NAME", "chain (default), ball-chain, paper-chain, binary, random, humanoids, fourbars or ladder");
+  add("Models", "--shape", texts.shape, "NAME",
+      "chain (default), ball-chain, paper-chain, binary, random, humanoids, fourbars, ladder or roller-chain");
   add("Models", "--dofs", texts.dofs, "A..B", "least and most degrees of freedom, default 10..100000");
   add("Models", "--seed", texts.seed, "K", "each starts from random positions and speeds, default 1");
   add.spread("Models", texts);

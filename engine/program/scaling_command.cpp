@@ -32,7 +32,7 @@ namespace {
 
 using Clock = Progress::Clock;
 
-constexpr std::array<ScalingShape, 8> kShapes{{
+constexpr std::array<ScalingShape, 9> kShapes{{
     {"chain", "chain", 1},
     {"ball-chain", "ball-chain", 3},
     {"paper-chain", "paper-chain", 1},
@@ -41,6 +41,7 @@ constexpr std::array<ScalingShape, 8> kShapes{{
     {"humanoids", "humanoids", kHumanoidFreedom},
     {"fourbars", "fourbars", 3},  // of its tree, as if loops were open
     {"ladder", "ladder", 3},
+    {"roller-chain", "roller-chain", 3},
 }};
 
 constexpr Index kMostFreedom = 10'000'000;

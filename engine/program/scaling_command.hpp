@@ -27,7 +27,8 @@ struct ScalingShape {
   double degrees_of_freedom;  // of one unit, what the number behind the colon counts, couplings left out
 };
 
-/// Throws InputError for a name that is none of chain, ball-chain, paper-chain, binary, random, humanoids, fourbars, ladder.
+/// Throws InputError for a name that is none of chain, ball-chain, paper-chain, binary, random, humanoids, fourbars, ladder,
+/// roller-chain.
 const ScalingShape& scaling_shape_from(const std::string& name);
 
 struct ScalingSizes {

@@ -228,6 +228,7 @@ constexpr GeneratedKind kGeneratedKinds[] = {
     {"ring", hanging_ring, 3},
     {"fourbars", four_bars, 1, 3, 5},
     {"ladder", ladder, 1, 3, 5},
+    {"roller-chain", roller_chain, 1, 3, 6},
 };
 constexpr std::string_view kNet = "net";
 
@@ -281,7 +282,7 @@ Model generate(const std::string& name) {
   }
   if (kind) return kind->make(count);
   throw InputError(fmt::format("model {}: {} cannot be generated; expected chain, ball-chain, paper-chain, tree, random, humanoids, ring, "
-                               "fourbars, ladder or net; choose one, or give a URDF file",
+                               "fourbars, ladder, roller-chain or net; choose one, or give a URDF file",
                                quoted(name), quoted(parts.kind)));
 }
 

@@ -59,13 +59,20 @@ Model four_bars(Index count);
 /// freedom left.
 Model ladder(Index cells);
 
+/// A bicycle chain of `links` links along x, 12.7 mm each, hung on the world by its first plates: two plates of 0.9 g, 5 mm apart, and a pin of
+/// 0.6 g at their far end, on which the next plates turn; bushings and rollers are left out. Every link is like every other, as of a half-link
+/// chain. In the tree a pin carries both plates, and the left plate the next pin, by hinges about y; a weld presses that pin into the right plate. 3
+/// links bodies, 6 links rows, of which 4 links follow from the others; links degrees of freedom left. So short a pendulum wants steps of 0.1 to
+/// 0.2 ms where it swings freely.
+Model roller_chain(Index links);
+
 /// `ropes` ball-chains of `knots` boxes along x, 0.1 m apart along y and held at one end, with boxes across between neighbours, tied by a ball
 /// coupling each. 2 ropes knots - knots bodies, 3 (ropes - 1) knots rows. From two ropes on.
 Model rope_net(Index ropes, Index knots);
 
-/// "chain:100", "paper-chain:100", "ball-chain:100", "tree:1023", "random:50", "humanoids:3", "ring:10", "fourbars:3", "ladder:5", "net:4x6".
-/// Throws InputError for anything else. Couplings take memory and time that grow with the square of their rows and more: several hundred rows
-/// take long.
+/// "chain:100", "paper-chain:100", "ball-chain:100", "tree:1023", "random:50", "humanoids:3", "ring:10", "fourbars:3", "ladder:5",
+/// "roller-chain:100", "net:4x6". Throws InputError for anything else. Nets take memory and time that grow with the square of their rows and more:
+/// several hundred rows take long.
 Model generate(const std::string& name);
 
 /// About how large the model of this name is; zeros where the name is none, or holds no number.

@@ -19,6 +19,13 @@ using Eigen::Vector3d;
 
 constexpr double kRight = std::numbers::pi / 2;
 
+// of a bicycle chain, half an inch by 1/8
+constexpr double kPitch = 0.0127, kPlatesApart = 0.005;                         // [m]
+constexpr double kPlateMass = 0.9e-3, kPinMass = 0.6e-3;                        // [kg]
+constexpr double kPinDiameter = 3.66e-3, kPinLength = 7.3e-3;                   // [m]
+// a box with the moments of a plate of 21 x 8.3 mm with round ends and two holes [m]
+constexpr double kPlateLength = 0.019, kPlateHeight = 0.008, kPlateThickness = 0.001;
+
 /// A rod along x, `share` times as long and as heavy as those of chains; it turns about y.
 LinkSpec rod_link(std::string name, std::string parent, const Isometry& placement, double share = 1) {
   LinkSpec link;
@@ -53,6 +60,31 @@ CouplingSpec hinge_pin(std::string name, const RodPlace& a, const RodPlace& b) {
   spec.frame_a.translation() = Vector3d(a.x, 0, a.z);
   spec.frame_b.translation() = Vector3d(b.x, 0, b.z);
   return spec;
+}
+
+/// A plate of a roller chain along x; it turns about y, on the pin before it.
+LinkSpec plate_link(std::string name, std::string pin, double y) {
+  LinkSpec link;
+  link.joint = name + "_joint";
+  link.name = std::move(name);
+  link.parent = std::move(pin);
+  link.placement.translation() = Vector3d(0, y, 0);
+  link.axis = Vector3d::UnitY();
+  link.inertia = box_inertia(kPlateMass, {kPlateLength, kPlateThickness, kPlateHeight}, {kPitch / 2, 0, 0});
+  return link;
+}
+
+/// A pin along y through both plates; it turns in the hole of the left one, where its frame is.
+LinkSpec pin_link(std::string name, std::string left_plate) {
+  LinkSpec link;
+  link.joint = name + "_joint";
+  link.name = std::move(name);
+  link.parent = std::move(left_plate);
+  link.placement.translation() = Vector3d(kPitch, 0, 0);
+  link.axis = Vector3d::UnitY();
+  const double square = kPinDiameter * kPinDiameter / 4, across = kPinMass * (3 * square + kPinLength * kPinLength) / 12;
+  link.inertia = {kPinMass, {0, -kPlatesApart / 2, 0}, Vector3d(across, kPinMass * square / 2, across).asDiagonal()};
+  return link;
 }
 
 }  // namespace
@@ -97,6 +129,23 @@ Model ladder(Index cells) {
     pins.push_back(hinge_pin(fmt::format("pin{}", i), {right, kRodLength, 0}, before));
   }
   return coupled(builder.build(), pins);
+}
+
+Model roller_chain(Index links) {
+  TreeBuilder builder(fmt::format("roller-chain:{}", links));
+  std::vector<CouplingSpec> presses;
+  for (Index i = 1; i <= links; ++i) {
+    const std::string before = i == 1 ? "" : fmt::format("pin{}", i - 1);
+    const std::string left = fmt::format("left{}", i), right = fmt::format("right{}", i), pin = fmt::format("pin{}", i);
+    builder.add(plate_link(left, before, i == 1 ? kPlatesApart / 2 : 0));
+    builder.add(pin_link(pin, left));
+    builder.add(plate_link(right, before, i == 1 ? -kPlatesApart / 2 : -kPlatesApart));
+    CouplingSpec press{.name = fmt::format("press{}", i), .kind = CouplingKind::weld, .link_a = pin, .link_b = right};
+    press.frame_a.translation() = Vector3d(0, -kPlatesApart, 0);
+    press.frame_b.translation() = Vector3d(kPitch, 0, 0);
+    presses.push_back(std::move(press));
+  }
+  return coupled(builder.build(), presses);
 }
 
 Model rope_net(Index ropes, Index knots) {

@@ -220,7 +220,7 @@ TEST_CASE("bodies that hang at one place are reached by one rod") {
 
 TEST_CASE("generated models are a handful of meshes, however many links they have") {
   for (const char* name : {"chain:10000", "ball-chain:200", "paper-chain:3", "tree:1023", "random:300", "humanoids:100", "chain:1", "ring:5",
-                           "fourbars:4", "ladder:4", "net:3x4"}) {
+                           "fourbars:4", "ladder:4", "roller-chain:4", "net:3x4"}) {
     CAPTURE(name);
     const Model model = generate(name);
     const Drawing drawing = drawing_of(model);

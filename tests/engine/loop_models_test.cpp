@@ -14,6 +14,7 @@
 #include "engine/scene/scene_file.hpp"
 #include "engine/simulation.hpp"
 #include "models/urdf/urdf.hpp"
+#include "tests/engine/linkage_humanoid.hpp"
 #include "tests/engine/mechanisms.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -195,6 +196,40 @@ TEST_CASE("the platform is where its six legs are as long as their motions say")
     CAPTURE(k);
     const Eigen::Vector3d foot(feet[k][0], feet[k][1], 0.05), ball = shift + turn * Eigen::Vector3d(balls[k][0], balls[k][1], 0);
     CHECK((ball - foot).norm() == Approx(0.535 + longer[k]).margin(1e-9));
+  }
+}
+
+TEST_CASE("a humanoid with a four-bar at each elbow, knee and ankle is as free as without, and keeps them closed and its energy") {
+  const Model model = linkage_humanoid(Base::floating), bare = load_urdf(model_file("humanoid.urdf"), Base::floating);
+  CHECK(model.tree.bodies() == bare.tree.bodies() + 2 * kLinkages);
+  REQUIRE(model.couplings.size() == kLinkages);
+  Simulation simulation(model, {.gravity = {0, 0, 0}});
+  CHECK(simulation.openness().gap < 1e-15);
+  random_start(simulation, 2, 0.4);
+  const std::vector<double> q(simulation.positions().begin(), simulation.positions().end());
+  const Mobility mobility = mobility_of(model, q);
+  CHECK(mobility.rows == 5 * kLinkages);
+  CHECK(mobility.freedom == bare.degrees_of_freedom());
+  check_swing(simulation);
+}
+
+TEST_CASE("the crank of a humanoid's linkage follows the knee as a four-bar's does") {
+  Effects bend;
+  const Model model = linkage_humanoid(Base::fixed);
+  const Index knee = row_of(model, "left_knee_pitch");
+  bend.motions.push_back({knee, {{0, 1}, {0, 1.2}}});
+  Simulation simulation(model, {.gravity = {0, 0, 0}}, bend);
+  for (int k = 0; k < 10; ++k) {
+    REQUIRE(simulation.run(100).ok());
+    const auto angle = [&](const char* joint) {
+      return simulation.positions()[static_cast<std::size_t>(model.tree.first_q(model.names.slot_of_joint.at(joint)))];
+    };
+    CHECK(angle("left_knee_pitch") == Approx(0.12 * (k + 1)).margin(1e-9));
+    // Freudenstein: the ends of lever and crank, both turned about y from -x, are as far apart as the rod is long
+    const double lever = angle("left_knee_pitch"), crank = angle("left_knee_crank_joint");
+    const double x = -0.06 * std::cos(crank) + 0.05 * std::cos(lever), z = 0.2 + 0.06 * std::sin(crank) - 0.05 * std::sin(lever);
+    CHECK(std::hypot(x, z) == Approx(std::hypot(0.01, 0.2)).margin(1e-12));
+    CHECK(crank > 0.5 * lever);
   }
 }
 

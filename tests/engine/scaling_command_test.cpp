@@ -58,7 +58,7 @@ TEST_CASE("the JSON of a scaling holds rows and fits", "[command line]") {
 
 TEST_CASE("every shape comes near the degrees of freedom that were asked for, and no model twice", "[command line]") {
   const Shell shell;
-  for (const std::string shape : {"chain", "ball-chain", "paper-chain", "binary", "random", "fourbars", "ladder"}) {
+  for (const std::string shape : {"chain", "ball-chain", "paper-chain", "binary", "random", "fourbars", "ladder", "roller-chain"}) {
     INFO(shape);
     REQUIRE(shell.linden("scaling --shape " + shape + " --dofs 10..30 --steps 5 --json a.json").exit_code == 0);
     const std::vector<int> dofs = column<int>(json_of(shell / "a.json")["rows"], "dofs");

@@ -10,7 +10,7 @@ namespace {
 
 /// Generating a large model takes long, as it should, and tells nothing of the reader.
 bool asks_for_much(const std::string& text) {
-  static const std::regex large("(chain|tree|random):[0-9]{3}|(humanoids|ring|fourbars|ladder):[0-9]{2}|net:[0-9x]{4}");
+  static const std::regex large("(chain|tree|random):[0-9]{3}|(humanoids|ring|fourbars|ladder|roller-chain):[0-9]{2}|net:[0-9x]{4}");
   return std::regex_search(text, large);
 }
 

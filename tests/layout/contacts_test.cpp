@@ -650,7 +650,8 @@ TEST_CASE("the humanoids stand on the four lowest corners of each foot") {
 
 TEST_CASE("generated humanoids have shapes, the other generated models none") {
   REQUIRE(humanoids(2).shapes.size() == 2 * 15);
-  for (const char* name : {"chain:10", "ball-chain:10", "tree:10", "paper-chain:10", "random:10", "ring:10", "fourbars:3", "ladder:3", "net:3x3"}) {
+  for (const char* name : {"chain:10", "ball-chain:10", "tree:10", "paper-chain:10", "random:10", "ring:10", "fourbars:3", "ladder:3",
+                           "roller-chain:3", "net:3x3"}) {
     REQUIRE(generate(name).shapes.empty());
   }
 }

@@ -51,7 +51,7 @@ def _tell(texts: list[str], stacklevel: int) -> None:
 
 def load(name: str | os.PathLike[str], base: str | None = None, density: float | None = None) -> Model:
     """A URDF file, or a generated model: chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, and with loops ring:N,
-    fourbars:N, ladder:N, net:AxB.
+    fourbars:N, ladder:N, roller-chain:N, net:AxB.
 
     base: "fixed" (where it is not given) or "floating", for URDF files. density: of links that have shapes and no inertia [kg/m^3].
     Raises InputError with file and line. What was read with a grain of salt is told as an InputWarning, and is in model.warnings.
