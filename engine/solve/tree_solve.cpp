@@ -117,7 +117,9 @@ Evaluated<double> TreeSolve<kEffects>::cut(double share) {
 template <bool kEffects>
 Lanes TreeSolve<kEffects>::converged(const Evaluated<double>& now) const {
   if (options_.stop == StopTest::absolute) return std::sqrt(now.plain) <= options_.tolerance * std::abs(h_) ? 1 : 0;
-  return within(now.norm, options_.tolerance * options_.tolerance, now.scale) || now.norm <= enough_ ? 1 : 0;
+  // a light link moves far by what is little beside the energy of the whole
+  const bool solved = within(now.norm, options_.tolerance * options_.tolerance, now.scale) && sweeps_.is_closed(options_.tolerance);
+  return solved || now.norm <= enough_ ? 1 : 0;
 }
 
 template <bool kEffects>

@@ -66,6 +66,7 @@ class CouplingSweeps {
     if (serves == Serves::steps_that_follow && !empty()) {
       of_others_.emplace(model, rows_);
       history_.allocate(static_cast<Index>(rows()), S(0.0));
+      factored_.assign(rows_.paths().velocities(), S(0.0));
     }
     for (std::vector<S>* each : {&lambda_, &increment_, &applied_, &pull_}) each->assign(rows(), S(0.0));
     if (!empty()) unpushed_.allocate(model.tree.shape.velocities);
@@ -169,6 +170,9 @@ class CouplingSweeps {
     const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
     ClosureFactors<S, Pack>& factors = factors_of(of);
     made_last_ = &factors;
+    for (const std::size_t k : closures()[closure].paths) {
+      if (of == Coupled::step && has_history()) keep_rows(all()[k]);
+    }
     if (motion != nullptr) return factors.close(closure, jacobian, constants, here, at_end, gains, ties, lanes, added);
     return factors.close(closure, jacobian, constants, here, here, gains, ties, lanes, added);
   }
@@ -196,6 +200,20 @@ class CouplingSweeps {
     factors_of(of).push(closure, variation, innovation, of == Coupled::step ? increment_ : pull_);
   }
 
+  /// r.Delta beyond Delta.A Delta, of the solve of a step made last, where r is what it leaves by rows as they are, and Delta by those of its factor.
+  S beyond_norm(const Field<S>& increment) const {
+    S sum(0.0);
+    if (!has_history()) return sum;
+    for (const CouplingPath& path : all()) {
+      rows_.each_on_path(path, [&](Index v, std::size_t n) {
+        const std::size_t first = path.first_velocity + n * path.room;
+        S turned(0.0);
+        for (std::size_t j = 0; j < path.rows(); ++j) turned = turned + increment_[path.first_row + j] * (factored_[first + j] - rows_.at_begin()[first + j]);
+        sum = sum + turned * increment(v);
+      });
+    }
+    return sum;
+  }
   /// r - G^T dlambda, of the solve of a step made last.
   void subtract_push(Field<S>& residual) const { rows_.push(increment_, rows_.at_begin(), residual, minus); }
   /// And back to r.
@@ -276,6 +294,15 @@ class CouplingSweeps {
 
   S openness() const { return rows_.openness(); }
   S widest_gap() const { return rows_.widest_gap(); }
+  /// The same of those that are pushed along, by the factor of a step: others may be open by what axes are off.
+  S widest_pushed_gap() const {
+    using std::abs, std::max;
+    S widest(0.0);
+    of_step_.each_row([&](std::size_t row, const S& inverse, const S&) {
+      if (is_rigid(row)) widest = max(widest, select(inverse == S(0.0), S(0.0), abs(gap(row)) / size(row)));
+    });
+    return widest;
+  }
   std::size_t rows() const { return rows_.count(); }
   bool is_rigid(std::size_t row) const { return rows_.is_rigid(row); }
   const S& gap(std::size_t row) const { return rows_.gaps()[row]; }
@@ -295,6 +322,7 @@ class CouplingSweeps {
   template <class Visit>
   void each_kept(const Visit& visit) {
     of_step_.each(visit);
+    visit(std::span(factored_));
     visit(history_.flat());
   }
   const Coupling& coupling_of(std::size_t row) const { return *rows_.paths().path_of(row).coupling; }
@@ -303,6 +331,10 @@ class CouplingSweeps {
   static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
   static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
 
+  void keep_rows(const CouplingPath& path) {
+    const auto first = static_cast<std::ptrdiff_t>(path.first_velocity);
+    std::copy_n(rows_.at_begin().begin() + first, path.room * path.velocities, factored_.begin() + first);
+  }
   ClosureFactors<S, Pack>& factors_of(Coupled of) { return of == Coupled::step || !of_others_ ? of_step_ : *of_others_; }
   std::span<const Closure> closures() const { return rows_.paths().closures(); }
   std::span<const CouplingPath> all() const { return rows_.paths().all(); }
@@ -313,6 +345,7 @@ class CouplingSweeps {
   std::optional<ClosureFactors<S, Pack>> of_others_;     // velocities and positions; none: the same serves for all
   const ClosureFactors<S, Pack>* made_last_ = &of_step_;
   CouplingSprings<S> springs_;
+  std::vector<S> factored_;     // G that the factor of a step was made with, where it outlasts that
   Field<S, kHistory> history_;  // multipliers of the last steps, latest first; empty where no factor outlasts one
   std::vector<S> lambda_;
   std::vector<S> increment_;  // of lambda, by the solve made last

@@ -364,7 +364,7 @@ void Writer::residual_by_itself() {
   add(When::evaluation, "norm of the residual", "residual, increment", "", [](Memory m, Slots) {
     double sum = 0;
     for (Index row = 0; row < m.work.residual.rows(); ++row) sum += m.work.residual(row) * m.work.increment(row);
-    m.now.norm = std::abs(sum);
+    m.now.norm = std::abs(sum - m.couplings.beyond_norm(m.work.increment));
   });
 }
 

@@ -72,7 +72,7 @@ double TreeSweeps<kEffects>::pass_residual() {
     couplings_.subtract_push(work_.residual);
     fold_mimics(ties_.mimics(), work_.residual);
   }
-  return std::abs(along(work_.increment));
+  return std::abs(along(work_.increment) - couplings_.beyond_norm(work_.increment));
 }
 
 template <bool kEffects>

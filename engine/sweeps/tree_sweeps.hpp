@@ -63,6 +63,8 @@ class TreeSweeps {
   /// After an evaluation or a refresh: of the row that is farthest open, its gap beside the size of its mechanism, the number of its coupling.
   double widest_gap() const { return couplings_.widest_gap(); }
   Index widest_coupling() const;
+  /// Whether all gaps are within this share of the size of their mechanism, but for rows that others hold already.
+  bool is_closed(double share) const { return couplings_.empty() || couplings_.widest_pushed_gap() <= share; }
   /// Coordinates of cables brought to their lengths at the positions of the last refresh, and a refresh; not those whose motion is given.
   void measure_cables(Field<double>& q);
   /// Velocities brought to the nearest, as the mass matrix measures, that leave couplings closed.

@@ -70,7 +70,8 @@ class ScheduleStepper {
   Lanes converged(const Evaluated<double>& now) const {
     const Options& options = memory.options;
     if (options.stop == StopTest::absolute) return std::sqrt(now.plain) <= options.tolerance * options.step ? 1 : 0;
-    return within(now.norm, options.tolerance * options.tolerance, now.scale) ? 1 : 0;
+    const bool closed = memory.couplings.empty() || memory.couplings.widest_pushed_gap() <= options.tolerance;
+    return closed && within(now.norm, options.tolerance * options.tolerance, now.scale) ? 1 : 0;
   }
   Lanes close(const Evaluated<double>& now) const {
     const double tolerance = kNearTolerance * memory.options.tolerance;
