@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 #include "engine/scene/scene_start.hpp"
@@ -16,6 +17,7 @@ const Keys kBodyKeys{"type",   "name",      "between", "point",             "axi
                      "frames", "joint", "stiffness", "damping", "turning_stiffness", "turning_damping"};
 const Keys kRodKeys{"type", "name", "between", "points", "length"};
 const Keys kSpringKeys{"type", "name", "between", "points", "stiffness", "damping", "rest"};
+const Keys kCableKeys{"type", "name", "between", "points", "joint", "length", "stiffness"};
 const Keys kGearKeys{"type", "name", "joints", "offset", "turning_stiffness", "turning_damping"};
 const Keys kAllKeys{"type",   "name",   "between", "point",     "axis",    "second_axis", "frames",            "points",
                     "length", "joint", "joints", "offset",  "stiffness", "damping", "rest",        "turning_stiffness", "turning_damping"};
@@ -47,6 +49,35 @@ std::vector<SceneValue> pair_of(const SceneValue& at, std::string_view expected)
   std::vector<SceneValue> items = at.list(expected);
   if (items.size() != 2) at.refuse(expected, "write one for each of both links");
   return items;
+}
+
+void read_cable(const SceneValue& at, CouplingSpec& spec) {
+  constexpr const char* kLinks = "between: [link, link, ...], from end to end; world is one too";
+  constexpr const char* kPoints = "points: one of each link, [[x, y, z], [x, y, z], ...]";
+  const SceneValue between = required(at, "between", kLinks), points = required(at, "points", kPoints);
+  const std::vector<SceneValue> links = between.list(kLinks), places = points.list(kPoints);
+  if (links.size() < 2) between.refuse(kLinks, "write two links or more; a link that is gone through twice stands there twice");
+  if (places.size() != links.size()) {
+    points.fail(fmt::format("{} has {} points and {} links", at.path(), places.size(), links.size()), kPoints, "write one for each link of between");
+  }
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    spec.through.push_back({links[k].text("the name of a link, or world"), vector_of(places[k].vector("[x, y, z] in m, in the link's frame"))});
+  }
+}
+
+/// How long a cable may become, or from where on it pulls.
+struct CableEnd {
+  std::string joint;
+  std::optional<double> length;  // none: as long as it is while all coordinates are zero
+  double stiffness;              // [N/m]; zero: it does not stretch
+};
+
+std::optional<CableEnd> end_of(const SceneValue& at, const CouplingSpec& spec) {
+  const auto length = at.find("length"), stiffness = at.find("stiffness");
+  if (spec.joint && !length && !stiffness) return std::nullopt;  // what acts on the joint is all there is
+  CableEnd end{spec.joint ? spec.joint->name : spec.name, std::nullopt, stiffness ? stiffness->positive() : 0};
+  if (length) end.length = length->positive();
+  return end;
 }
 
 void read_bodies(const SceneValue& at, CouplingSpec& spec) {
@@ -104,14 +135,19 @@ CouplingSpec read_coupling(const SceneValue& at) {
   const SceneValue type = required(at, "type", "type: hinge, ball, weld, rod, spring, gear or another one");
   spec.kind = kind_of(type);
   const bool spring = type.choice(kTypeNames) == kSpring;
-  at.entries_of(spec.kind == CouplingKind::gear ? kGearKeys : spring ? kSpringKeys : spec.kind == CouplingKind::rod ? kRodKeys : kBodyKeys);
-  spec.shift = read_compliance(at, "stiffness", "damping");
+  at.entries_of(spec.kind == CouplingKind::gear ? kGearKeys : spec.kind == CouplingKind::cable ? kCableKeys : spring ? kSpringKeys : spec.kind == CouplingKind::rod ? kRodKeys : kBodyKeys);
+  if (spec.kind != CouplingKind::cable) spec.shift = read_compliance(at, "stiffness", "damping");
   spec.turn = read_compliance(at, "turning_stiffness", "turning_damping");
   if (spring && !spec.shift.gives_way()) {
     at.fail(fmt::format("{} neither pulls nor damps", at.path()), "stiffness: in N/m, damping: in N s/m, or both; a rod is rigid", "add one");
   }
   if (const auto name = at.find("name")) spec.name = name->text("a name");
   if (const auto joint = at.find("joint")) spec.joint = ClosingJoint{.name = joint->text("a name for the coordinate of this joint")};
+  if (spec.kind == CouplingKind::cable) {
+    if (spec.name.empty()) at.fail(fmt::format("{} has no name", at.path()), "name: of the cable, which its length is called by", "add it");
+    read_cable(at, spec);
+    return spec;
+  }
   if (spec.kind != CouplingKind::gear) {
     read_bodies(at, spec);
     return spec;
@@ -125,12 +161,26 @@ CouplingSpec read_coupling(const SceneValue& at) {
 
 }  // namespace
 
-Model read_couplings(const SceneValue& at, Model model) {
+SceneCouplings read_couplings(const SceneValue& at, Model model) {
+  std::vector<CableEnd> ends;
   for (const SceneValue& item : at.list("couplings, {type: hinge, between: [link, link], point: [x, y, z], axis: [x, y, z]}")) {
     const CouplingSpec spec = read_coupling(item);
     model = item.located([&] { return coupled(std::move(model), {spec}); });
+    if (spec.kind != CouplingKind::cable) continue;
+    if (auto end = end_of(item, spec)) ends.push_back(*std::move(end));
   }
-  return model;
+  SceneCouplings read{std::move(model), {}};
+  const std::vector<double> neutral = read.model.neutral();
+  for (const CableEnd& end : ends) {
+    const Index slot = read.model.names.slot_of_joint.at(end.joint), row = read.model.tree.first_v(slot);
+    const double length = end.length.value_or(neutral[static_cast<std::size_t>(read.model.tree.first_q(slot))]);
+    if (end.stiffness > 0) {
+      read.ends.dead_zone_springs.push_back({.row = row, .stiffness = end.stiffness, .half_width = length / 2, .rest = length / 2});
+    } else {
+      read.ends.limits.push_back({.row = row, .upper = length});
+    }
+  }
+  return read;
 }
 
 }  // namespace linden

@@ -56,12 +56,18 @@ class SceneReader {
   Scene read() {
     root_.entries_of(kScene, effect_keys(), "effects");
     read_model();
-    if (const auto couplings = root_.find("couplings")) scene_.model = read_couplings(*couplings, std::move(scene_.model));
+    if (const auto couplings = root_.find("couplings")) {
+      SceneCouplings coupled = read_couplings(*couplings, std::move(scene_.model));
+      scene_.model = std::move(coupled.model);
+      cable_ends_ = std::move(coupled.ends);
+    }
     read_options();
     const auto initial = root_.find("initial"), effects = root_.find("effects");
     if (const auto rule = root_.find("start")) scene_.start_as_given = rule->choice(kStarts) == "as given";
     Effects limited;
     if (effects) limited.limits = read_limits(*effects, scene_.model);
+    limited.limits.insert(limited.limits.end(), cable_ends_.limits.begin(), cable_ends_.limits.end());
+    if (initial) refuse_lengths(*initial);
     scene_.initial = read_start(initial, scene_.model, bases_, given_, limited.limits);
     close_couplings(initial);
     require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
@@ -78,12 +84,24 @@ class SceneReader {
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
       if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
+    add_cable_ends(effects);
     scene_.seed = read_seed(initial, given_).value_or(kDefaultSeed);
     if (const auto randomize = root_.find("randomize")) read_randomize(*randomize);
     return std::move(scene_);
   }
 
  private:
+  /// Where cables are taut, beside the effects that the scene names.
+  void add_cable_ends(const std::optional<SceneValue>& effects) {
+    for (const JointLimit& end : cable_ends_.limits) {
+      if (std::ranges::find(scene_.effects.limits, end.row, &JointLimit::row) == scene_.effects.limits.end()) continue;
+      effects->fail(fmt::format("limits of {}, which has a length", quoted(scene_.model.names.velocity[static_cast<std::size_t>(end.row)])),
+                    "one of both", "leave out the length of the cable, or its limits");
+    }
+    const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    add(scene_.effects.limits, cable_ends_.limits);
+    add(scene_.effects.dead_zone_springs, cable_ends_.dead_zone_springs);
+  }
   /// Joints whose motion is given start where that does, as fast as it does.
   void begin_motions() {
     const Tree& tree = scene_.model.tree;
@@ -97,15 +115,31 @@ class SceneReader {
     }
   }
   void refuse_given(const SceneValue& initial) const {
+    each_started(initial, [&](const SceneValue::Entry& entry) {
+      const Index row = row_of(scene_.model, entry.key);
+      if (std::ranges::find(scene_.effects.motions, row, &JointMotion::row) == scene_.effects.motions.end()) return;
+      entry.value.fail(fmt::format("the motion of joint {} is given", quoted(entry.key)), "a joint that moves by itself",
+                       "leave it out: it starts where effects.motion does");
+    });
+  }
+  void refuse_lengths(const SceneValue& initial) const {
+    for (const Coupling& coupling : scene_.model.couplings) {
+      if (coupling.kind != CouplingKind::cable) continue;
+      each_started(initial, [&](const SceneValue::Entry& entry) {
+        const auto joint = scene_.model.names.slot_of_joint.find(entry.key);
+        if (joint == scene_.model.names.slot_of_joint.end() || scene_.model.tree.first_v(joint->second) != coupling.terms.front().v_row) return;
+        entry.value.fail(fmt::format("{} is the length of a cable", quoted(entry.key)), "a joint that may be anywhere",
+                         "leave it out: it follows from where the links are");
+      });
+    }
+  }
+  /// visit(entry) of joints that are given a position or a velocity.
+  template <class Visit>
+  static void each_started(const SceneValue& initial, const Visit& visit) {
     for (const char* key : {"positions", "velocities"}) {
       const auto values = initial.find(key);
       if (!values || values->is(Kind::nothing)) continue;
-      for (const SceneValue::Entry& entry : values->entries("a map of joints")) {
-        const Index row = row_of(scene_.model, entry.key);
-        if (std::ranges::find(scene_.effects.motions, row, &JointMotion::row) == scene_.effects.motions.end()) continue;
-        entry.value.fail(fmt::format("the motion of joint {} is given", quoted(entry.key)), "a joint that moves by itself",
-                         "leave it out: it starts where effects.motion does");
-      }
+      for (const SceneValue::Entry& entry : values->entries("a map of joints")) visit(entry);
     }
   }
 
@@ -291,7 +325,7 @@ class SceneReader {
       const std::string& joint = part.model.names.joint[static_cast<std::size_t>(slot)];
       BaseStart start = entrant.base;
       if (moved) start.position.reset(), start.rotation.reset();
-      bases_.push_back({scene_.model.names.slot_of_joint.at(part.name.empty() ? joint : part.name + "/" + joint), start});
+      bases_.push_back({part.name.empty() ? joint : part.name + "/" + joint, start});
     }
   }
 
@@ -338,6 +372,7 @@ class SceneReader {
   std::optional<Model> model_;
   Scene scene_;
   std::vector<PlacedBase> bases_;
+  Effects cable_ends_;
 };
 
 }  // namespace

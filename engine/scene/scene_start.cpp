@@ -39,9 +39,10 @@ class Start {
 
   /// Moves a free root by the pose that its model is given.
   void place(const PlacedBase& base) {
-    const Isometry placement = placement_of(model_, base.slot);
-    put_pose(base.slot, placement.inverse() * isometry(base.start.pose()) * placement * pose_in(base.slot));
-    put_velocity(base.slot, base.start);
+    const Index slot = model_.names.slot_of_joint.at(base.joint);
+    const Isometry placement = placement_of(model_, slot);
+    put_pose(slot, placement.inverse() * isometry(base.start.pose()) * placement * pose_in(slot));
+    put_velocity(slot, base.start);
   }
 
   /// Puts a free root where the scene says, in the world's frame; what it does not say stays.

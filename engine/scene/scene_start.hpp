@@ -34,7 +34,7 @@ BaseStart read_base(const SceneValue& at);
 
 /// A root on a free joint that a scene puts somewhere.
 struct PlacedBase {
-  Index slot;
+  std::string joint;  // couplings may add bodies before: a slot would be another's then
   BaseStart start;
 };
 

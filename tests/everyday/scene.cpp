@@ -23,6 +23,10 @@ using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// Kinds of couplings that are drawn, the first so many: cables are made by themselves.
+constexpr int kDrawnKinds = 10;
+static_assert(kDrawnKinds == static_cast<int>(CouplingKind::cable));
+
 enum Kind { swing, settle, servo, friction, limits, push, torque, drag, rest_on_ground, drop, anything, kinds };
 constexpr std::array<const char*, kinds> kNames{"swing",  "settle", "servo", "friction",       "limits", "push",
                                                 "torque", "drag",   "rest on ground", "drop", "anything"};
@@ -51,8 +55,10 @@ class Maker {
     make_start();
     if (scene_.number % 6 == 4) make_couplings();
     if (scene_.number % 6 == 1 || scene_.number % 12 == 10) make_springs();
+    if (scene_.number % 12 == 2) make_cable();
     measure();
     make_effects();
+    if (cable_) hold_cable();
     choose_length();
     scene_.sudden = !scene_.effects.friction.empty() || !scene_.effects.limits.empty() || scene_.effects.ground;
     return std::move(scene_);
@@ -143,10 +149,14 @@ class Maker {
       builder.add(std::move(link));
     }
     scene_.model = std::make_shared<const Model>(builder.build());
-    for (const Mimic& mimic : model().mimics) followers_.insert(mimic.follower_v);
+    find_followers();
   }
 
   const Model& model() const { return *scene_.model; }
+  void find_followers() {
+    followers_.clear();
+    for (const Mimic& mimic : model().mimics) followers_.insert(mimic.follower_v);
+  }
   template <class Visit>
   void each_screw(const Visit& visit) const {
     for (Index i = 1; i < model().tree.shape.slots; ++i) {
@@ -191,7 +201,7 @@ class Maker {
     std::vector<CouplingSpec> specs;
     const std::vector<Isometry> poses = poses_at_start();
     for (int tries = 0; tries < 6 && specs.size() < 3; ++tries) {
-      const auto kind = static_cast<CouplingKind>(random.below(kCouplingKinds));
+      const auto kind = static_cast<CouplingKind>(random.below(kDrawnKinds));
       const auto rows = static_cast<Index>(rows_of(kind).size());
       const auto a = static_cast<Index>(random.below(static_cast<std::uint64_t>(bodies) + 1));
       const auto b = static_cast<Index>(1 + random.below(static_cast<std::uint64_t>(bodies)));
@@ -231,6 +241,7 @@ class Maker {
     InitialState start = start_in(*tied);
     if (starts_singular(*tied, start.positions, random)) return;
     scene_.model = std::move(tied);
+    find_followers();
     scene_.start = std::move(start);
     scene_.coupled = true;
   }
@@ -261,7 +272,7 @@ class Maker {
     const auto is_link = [&](Index slot) { return slot == 0 || model().names.link.contains(model().names.body[static_cast<std::size_t>(slot)]); };
     std::vector<CouplingSpec> specs;
     for (int tries = 0; tries < 6 && specs.size() < 1 + scene_.number % 3; ++tries) {
-      const CouplingKind kind = random.uniform(0, 1) < 0.5 ? CouplingKind::rod : static_cast<CouplingKind>(random.below(kCouplingKinds - 1));
+      const CouplingKind kind = random.uniform(0, 1) < 0.5 ? CouplingKind::rod : static_cast<CouplingKind>(random.below(kDrawnKinds - 1));
       const auto a = static_cast<Index>(random.below(static_cast<std::uint64_t>(bodies) + 1));
       const auto b = static_cast<Index>(1 + random.below(static_cast<std::uint64_t>(bodies)));
       if (a == b || !is_link(a) || !is_link(b)) continue;
@@ -290,6 +301,65 @@ class Maker {
       specs.push_back(spec);
     }
     if (!specs.empty()) scene_.model = std::make_shared<const Model>(coupled(*scene_.model, specs));
+  }
+
+  /// A cable through two to four points of bodies, or of the world. Numbers of its own, likewise.
+  void make_cable() {
+    Random random(scene_.seed * 49979687 + scene_.number);
+    const Index bodies = model().tree.bodies();
+    CouplingSpec spec;
+    spec.name = "cable";
+    spec.kind = CouplingKind::cable;
+    const std::size_t count = 2 + random.below(3);
+    std::set<Index> through;
+    for (int tries = 0; tries < 12 && spec.through.size() < count; ++tries) {
+      const auto slot = static_cast<Index>(random.below(static_cast<std::uint64_t>(bodies) + 1));
+      const Eigen::Vector3d point(random.uniform(0, 0.3), random.uniform(-0.2, 0.2), slot == 0 ? random.uniform(0.3, 1.5) : random.uniform(-0.2, 0.2));
+      if (slot != 0 && !model().names.link.contains(model().names.body[static_cast<std::size_t>(slot)])) continue;
+      spec.through.push_back({slot == 0 ? "world" : model().names.body[static_cast<std::size_t>(slot)], point});
+      through.insert(slot);
+    }
+    if (spec.through.size() < 2 || through.size() < 2) return;
+    const auto tied = std::make_shared<const Model>(coupled(*scene_.model, {spec}));
+    InitialState start = start_in(*tied);
+    const GearTerm& length = tied->couplings.back().terms.front();
+    const reference::PlainTree tree = reference::plain_tree(*tied);
+    const reference::PlainCouplings rows(tree, tied->couplings);
+    const auto vector_of = [](const std::vector<double>& numbers) { return VectorXd(Eigen::Map<const VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()))); };
+    start.positions[static_cast<std::size_t>(length.q_row)] += rows.gaps(vector_of(start.positions))[0];
+    start.velocities[static_cast<std::size_t>(length.v_row)] = (rows.opening(vector_of(start.positions)) * vector_of(start.velocities))[0];
+    scene_.model = tied;
+    find_followers();
+    scene_.start = std::move(start);
+    cable_ = length;
+    scene_.coupled = true;
+  }
+  /// It does not stretch beyond a length that it has at the start, or later, or it pulls like a spring from there on.
+  void hold_cable() {
+    Random random(scene_.seed * 67867967 + scene_.number);
+    const auto log_uniform = [&](double low, double high) { return std::exp(random.uniform(std::log(low), std::log(high))); };
+    const Index row = cable_->v_row;
+    Effects& effects = scene_.effects;
+    const auto of_it = [row](const auto& entry) { return entry.row == row; };
+    if (std::ranges::any_of(effects.motions, of_it)) return;
+    std::erase_if(effects.limits, of_it);
+    std::erase_if(effects.dead_zone_springs, of_it);
+    const double now = scene_.start.positions[static_cast<std::size_t>(cable_->q_row)];
+    const double most = now * (random.uniform(0, 1) < 0.4 ? 1 : random.uniform(1, 1.3));
+    if (random.uniform(0, 1) < 0.6) {
+      effects.limits.push_back({.row = row, .upper = most, .restitution = random.uniform(0, 1) < 0.3 ? random.uniform(0, 1) : 0});
+      return;
+    }
+    // gains follow from what the cable moves
+    const reference::PlainTree tree = reference::plain_tree(model());
+    const reference::PlainScene at = plain();
+    Eigen::MatrixXd C = reference::PlainCouplings(tree, model().couplings).opening(at.q);
+    C.col(row).setZero();
+    const double moved = (C * at.mass_matrix().ldlt().solve(C.transpose()))(0, 0);
+    if (!(moved > 1e-9)) return;
+    const double w = std::min(log_uniform(0.01, scene_.stiff ? 4 : 0.3) / h_, scene_.stiff ? 1e4 : 500);
+    effects.dead_zone_springs.push_back({.row = row, .stiffness = w * w / moved, .half_width = most / 2, .rest = most / 2});
+    scene_.bends = true;
   }
 
   /// A coupling of two bodies, closed at the start; of a rod as far apart as they are.
@@ -636,6 +706,7 @@ class Maker {
   double h_ = 1e-3;
   VectorXd inertia_, load_;
   std::set<Index> followers_;
+  std::optional<GearTerm> cable_;  // its length
 };
 
 }  // namespace

@@ -62,6 +62,22 @@ class PlainCouplings {
         all.push_back(sum);
         continue;
       }
+      if (one.kind == CouplingKind::cable) {
+        using std::sqrt;
+        const auto at = [&](const CablePoint& point) {
+          const Vector3<T> in_body(T(point.at[0]), T(point.at[1]), T(point.at[2]));
+          const Matrix4<T>& body = pose[static_cast<std::size_t>(point.slot)];
+          return Vector3<T>(body.template topRightCorner<3, 1>() + body.template topLeftCorner<3, 3>() * in_body);
+        };
+        T length(0);
+        for (std::size_t k = 1; k < one.points.size(); ++k) {
+          const Vector3<T> apart = at(one.points[k]) - at(one.points[k - 1]);
+          length += sqrt(T(apart.dot(apart)));
+        }
+        const GearTerm& term = one.terms.front();
+        all.push_back(length - (T(q[term.q_row]) + eps[term.v_row]));
+        continue;
+      }
       const Matrix4<T> A = pose[static_cast<std::size_t>(one.slot_a)] * matrix_of(one.frame_a).template cast<T>();
       const Matrix4<T> B = pose[static_cast<std::size_t>(one.slot_b)] * matrix_of(one.frame_b).template cast<T>();
       const Matrix3<T> a = A.template topLeftCorner<3, 3>(), b = B.template topLeftCorner<3, 3>();
@@ -82,7 +98,8 @@ class PlainCouplings {
           add({sqrt(apart.dot(apart)) - T(one.length)});
           break;
         }
-        case CouplingKind::gear: break;
+        case CouplingKind::gear:
+        case CouplingKind::cable: break;
       }
     }
     VectorX<T> result(static_cast<Eigen::Index>(rows_.size()));
