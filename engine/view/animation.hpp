@@ -30,6 +30,16 @@ struct DrawnForce {
   std::array<float, 3> force{};   // world frame [N]
 };
 
+/// A cable, a spring or a rod: straight from point to point.
+struct DrawnLine {
+  struct Point {
+    Index slot = 0;                // body that it is on; 0: the world
+    std::array<float, 3> place{};  // in the frame that `poses` has [m]
+  };
+  std::string name;
+  std::vector<Point> points;  // two or more
+};
+
 struct Animation {
   std::string title;
   std::vector<std::string> notes;    // what is left out, and why: sentences for people
@@ -37,6 +47,7 @@ struct Animation {
   std::vector<std::string> joints;   // [bodies]  that carries it
   std::vector<Index> parents;        // [bodies]  body that carries it; -1: the world
   Drawing drawing;                   // whose parts are in the frames that `poses` has
+  std::vector<DrawnLine> lines;
   std::int64_t instances = 1;
   std::vector<double> times;         // [frames, s], rising
   std::vector<float> poses;          // [frames x instances x bodies x 7]  quaternion x y z w, place [m]: frame of the link at the body's

@@ -11,6 +11,7 @@
 #include "kernels/queries/body_motion_down.hpp"
 #include "layout/support/input_error.hpp"
 #include "models/build/isometry.hpp"
+#include "models/build/vectors.hpp"
 
 namespace linden {
 namespace {
@@ -39,6 +40,25 @@ std::vector<Pose> link_frames(const Model& model) {
   return frames;
 }
 
+/// Couplings that go from point to point.
+std::vector<DrawnLine> lines_of(const Model& model, const std::vector<Pose>& frames) {
+  std::vector<DrawnLine> lines;
+  for (const Coupling& coupling : model.couplings) {
+    DrawnLine line{coupling.name, {}};
+    const auto add = [&](Index slot, const std::array<double, 3>& at) {
+      const Eigen::Vector3d place = isometry(frames[static_cast<std::size_t>(slot)]).inverse() * vector_of(at);
+      line.points.push_back({slot, {static_cast<float>(place.x()), static_cast<float>(place.y()), static_cast<float>(place.z())}});
+    };
+    for (const CablePoint& point : coupling.points) add(point.slot, point.at);
+    if (coupling.kind == CouplingKind::rod) {
+      add(coupling.slot_a, coupling.frame_a.shift);
+      add(coupling.slot_b, coupling.frame_b.shift);
+    }
+    if (!line.points.empty()) lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
 }  // namespace
 
 AnimationRecorder::AnimationRecorder(const Model& model, const Effects& effects, std::string title, std::int64_t instances)
@@ -48,6 +68,7 @@ AnimationRecorder::AnimationRecorder(const Model& model, const Effects& effects,
   for (DrawnPart& part : animation_.drawing.parts) {
     part.pose = pose_of(isometry(frames_[static_cast<std::size_t>(part.slot)]).inverse() * isometry(part.pose));
   }
+  animation_.lines = lines_of(model, frames_);
   animation_.instances = instances;
   const Tree& tree = model.tree;
   for (Index i = 1; i < tree.shape.slots; ++i) {

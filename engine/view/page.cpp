@@ -241,6 +241,12 @@ nlohmann::ordered_json header_of(const Animation& animation, const std::vector<R
     meshes.push_back({{"points", mesh.positions.size() / 3}, {"triangles", mesh.indices.size() / 3}});
   }
   for (const DrawnPart& part : animation.drawing.parts) links.push_back(part.link);
+  nlohmann::ordered_json lines = nlohmann::ordered_json::array();
+  for (const DrawnLine& line : animation.lines) {
+    nlohmann::ordered_json points = nlohmann::ordered_json::array();
+    for (const DrawnLine::Point& point : line.points) points.push_back({point.slot, point.place[0], point.place[1], point.place[2]});
+    lines.push_back({{"name", line.name}, {"points", points}});
+  }
   for (std::size_t c = 0; c < animation.curves.size(); ++c) {
     const Curve& curve = animation.curves[c];
     curves.push_back({{"group", curve.group},
@@ -261,6 +267,7 @@ nlohmann::ordered_json header_of(const Animation& animation, const std::vector<R
           {"parts", animation.drawing.parts.size()},
           {"meshes", meshes},
           {"links", links},
+          {"lines", lines},
           {"curves", curves},
           {"grid", grid},
           {"error", {{"place", grid[3] * std::numbers::sqrt3 / 2}, {"angle", kAngleError}}},

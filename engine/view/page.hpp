@@ -15,6 +15,7 @@
 //     "bodies"     [names], "joints" [names], "parents" [body or -1]                              of B bodies
 //     "parts"      P, "meshes" [{"points": n, "triangles": m}, ...]                               of M meshes
 //     "links"      [name of each part's link]
+//     "lines"      [{"name", "points": [[slot, x, y, z], ...]}, ...]   cables, springs and rods: 0, the world, or b + 1, and a place in its frame [m]
 //     "curves"     [{"group", "name", "unit", "body" (-1: none), "instance", "least", "most"}, ...]   of C curves
 //     "grid"       [x, y, z, step]                          place = (x, y, z) + step k [m]
 //     "error"      {"place": e, "angle": a}             most that a pose may be off through rounding [m], [rad]

@@ -119,7 +119,7 @@ TEST_CASE("the platform swings on springs, closed") {
 }
 
 TEST_CASE("the scenes of the models with loops run to their ends, closed") {
-  const char* file = GENERATE("scenes/gripper.yaml", "scenes/leg.yaml", "scenes/stewart.yaml");
+  const char* file = GENERATE("scenes/gripper.yaml", "scenes/leg.yaml", "scenes/stewart.yaml", "scenes/hoist.yaml");
   CAPTURE(file);
   const Scene scene = load_scene(model_file(file));
   Simulation simulation(scene);

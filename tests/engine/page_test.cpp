@@ -17,6 +17,7 @@
 #include "engine/view/base64.hpp"
 #include "engine/view/curves.hpp"
 #include "engine/view/page_template.hpp"
+#include "models/build/coupled_model.hpp"
 #include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 
@@ -101,6 +102,37 @@ Animation random_animation(std::size_t frames, std::int64_t instances, double ex
     animation.forces.push_back({});
   }
   return animation;
+}
+
+TEST_CASE("cables, springs and rods are lines between places on bodies, in the frames that poses have") {
+  if (page_template().empty()) return;
+  CouplingSpec cable, rod;
+  cable.name = "cable";
+  cable.kind = CouplingKind::cable;
+  cable.through = {{"world", {1, 2, 3}}, {"link1", {0.1, 0.2, 0.3}}, {"link2", {0.5, 0, 0}}};
+  rod.name = "rod";
+  rod.kind = CouplingKind::rod;
+  rod.link_b = "link2";
+  rod.frame_a.translation() = Eigen::Vector3d(0, 0, 1);
+  const Model model = coupled(generate("chain:2"), {cable, rod});
+  AnimationRecorder recorder(model, {}, "lines", 1);
+  const std::vector<double> neutral = model.neutral();
+  recorder.add(0, neutral);
+  const nlohmann::json lines = PageData(page_of(recorder.animation())).header.at("lines");
+  REQUIRE(lines.size() == 2);
+  CHECK(lines[0].at("name") == "cable");
+  const auto slot = [&](const char* link) { return model.names.link.at(link).slot; };
+  const auto check = [&](const nlohmann::json& point, Index on, std::array<double, 3> at) {
+    CHECK(point[0] == on);
+    for (std::size_t k = 0; k < 3; ++k) CHECK(point[k + 1].get<double>() == Approx(at[k]).margin(1e-6));
+  };
+  REQUIRE(lines[0].at("points").size() == 3);
+  check(lines[0].at("points")[0], 0, {1, 2, 3});
+  check(lines[0].at("points")[1], slot("link1"), {0.1, 0.2, 0.3});
+  check(lines[0].at("points")[2], slot("link2"), {0.5, 0, 0});
+  REQUIRE(lines[1].at("points").size() == 2);
+  check(lines[1].at("points")[0], 0, {0, 0, 1});
+  check(lines[1].at("points")[1], slot("link2"), {0, 0, 0});
 }
 
 TEST_CASE("a page gives back all poses within the error that it states") {

@@ -74,6 +74,63 @@ TEST_CASE("a start that is open is closed if it is told to be, or nearly closed 
                     Catch::Contains("nothing to assemble"));
 }
 
+double at(const Simulation& simulation, const std::string& joint) {
+  const Model& model = simulation.model();
+  return simulation.positions()[static_cast<std::size_t>(model.tree.first_q(model.names.slot_of_joint.at(joint)))];
+}
+
+TEST_CASE("a cable comes to its length and no farther, or stretches from there, and begins where its links are") {
+  const std::string cable = "{type: cable, name: rope, between: [world, crank, rocker], points: [[1, 0, 3], [0, 0, 1], [-1, 0, 2]]";
+  const double apart = std::hypot(1.0, 2.0) + std::hypot(2.0, 1.0);  // (1, 0, 3) - (0, 0, 1) - (2, 0, 2)
+  const Scene drawn_there = with(cable + "}");
+  CHECK(at(Simulation(drawn_there), "rope") == Approx(apart).epsilon(1e-14));
+  REQUIRE(drawn_there.effects.limits.size() == 1);
+  CHECK(drawn_there.effects.limits[0].upper == Approx(apart).epsilon(1e-14));
+  CHECK(drawn_there.effects.limits[0].row == drawn_there.model.tree.first_v(drawn_there.model.names.slot_of_joint.at("rope")));
+
+  Simulation stops(with(cable + ", length: 5}"));
+  double longest = 0;
+  for (int k = 0; k < 2000; ++k) {
+    REQUIRE(stops.step().ok());
+    longest = std::max(longest, at(stops, "rope"));
+    REQUIRE(worst_gap(stops.couplings()) < 1e-9);
+  }
+  CHECK(longest == Approx(5).epsilon(1e-11));
+
+  const Scene elastic = with(cable + ", length: 5, stiffness: 1e4}");
+  REQUIRE(elastic.effects.dead_zone_springs.size() == 1);
+  CHECK(elastic.effects.limits.empty());
+  Simulation stretches(elastic);
+  const double before = stretches.energy().total();
+  longest = 0;
+  for (int k = 0; k < 2000; ++k) {
+    REQUIRE(stretches.step().ok());
+    longest = std::max(longest, at(stretches, "rope"));
+  }
+  CHECK(longest > 5.001);
+  CHECK(longest < 5.2);
+  CHECK(stretches.energy().total() == Approx(before).margin(0.05));
+
+  const Scene moved = with(cable + ", length: 5}", "initial: {positions: {crank: 0.2}}");
+  CHECK(at(Simulation(moved), "rope") == Approx(std::hypot(1 - std::sin(0.2), 3 - std::cos(0.2)) + std::hypot(2 - std::sin(0.2), 2 - std::cos(0.2))).epsilon(1e-14));
+  CHECK(at(Simulation(moved), "crank") == 0.2);
+  const Scene free = with("{type: cable, name: rope, joint: tendon, between: [world, crank], points: [[1, 0, 3], [0, 0, 1]]}");
+  CHECK(free.effects.limits.empty());
+  CHECK(free.model.names.slot_of_joint.contains("tendon"));
+}
+
+TEST_CASE("a floating model beside others is where the scene puts it, whatever couplings add before it") {
+  const Scene scene = parse_scene(fmt::format("models:\n  - {{model: {}, name: crane}}\n  - {{model: {}, name: load, base: floating, position: [0.5, 0, 2]}}\n"
+                                              "duration: 1\ncouplings:\n  - {{type: cable, name: rope, between: [crane/trolley, load/sheave], points: [[0, 0, 0], [0, 0, 0]]}}\n",
+                                              model_file("crane.urdf"), model_file("crate.urdf")),
+                                  "two.yaml");
+  const Simulation simulation(scene);
+  const Index q = scene.model.tree.first_q(scene.model.names.slot_of_joint.at("load/root"));
+  CHECK(simulation.positions()[static_cast<std::size_t>(q)] == 0.5);
+  CHECK(simulation.positions()[static_cast<std::size_t>(q) + 2] == 2);
+  CHECK(at(simulation, "rope") == Approx(std::hypot(0.5, 3.5)).epsilon(1e-14));
+}
+
 TEST_CASE("what a coupling cannot be is told with its line") {
   const auto message = [](const std::string& text) -> std::string {
     try {
@@ -95,6 +152,11 @@ TEST_CASE("what a coupling cannot be is told with its line") {
   CHECK_THAT(message("{type: spring, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: -2}"), Catch::Contains("stiffness"));
   CHECK_THAT(message("{type: ball, between: [coupler, rocker], point: [2, 0, 2], turning_stiffness: 3}"), Catch::Contains("nothing that turns"));
   CHECK_THAT(message("{type: rod, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: 3}"), Catch::Contains("stiffness"));
+  CHECK_THAT(message("{type: cable, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]]}"), Catch::Contains("has no name"));
+  CHECK_THAT(message("{type: cable, name: c, between: [coupler], points: [[0, 0, 0]]}"), Catch::Contains("write two links or more"));
+  CHECK_THAT(message("{type: cable, name: c, between: [coupler, rocker], points: [[0, 0, 0]]}"), Catch::Contains("1 points and 2 links"));
+  CHECK_THAT(message("{type: cable, name: c, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], damping: 3}"), Catch::Contains("damping"));
+  CHECK_THAT(message("{type: cable, name: crank, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]]}"), Catch::Contains("there is a joint \"crank\" already"));
 }
 
 }  // namespace

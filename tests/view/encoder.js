@@ -80,6 +80,7 @@ export function encode(motion, change = (sections) => sections) {
     parts: parts.length,
     meshes: meshes.map(({ positions, indices }) => ({ points: positions.length / 3, triangles: indices.length / 3 })),
     links: parts.map(({ link }) => link),
+    lines: motion.lines ?? [],
     curves: curves.map(({ group, name, unit = '', body = -1, instance = 0 }, c) => {
       const { least, most } = drawn[c];
       return { group, name, unit, body, instance, least, most };

@@ -122,6 +122,8 @@ test('a header that is wrong is told', async () => {
     [{ ...header, grid: [0, 0, null, 1] }, /no grid of places/],
     [{ ...header, bodies: null }, /no list of bodies/],
     [{ ...header, parents: [] }, /bodies, joints and parents differ/],
+    [{ ...header, lines: [{ name: 'rope', points: [[0, 0, 0, 0], [header.bodies.length + 1, 0, 0, 0]] }] }, /a line goes through a point that is not there/],
+    [{ ...header, lines: [{ name: 'rope', points: [[0, 0, 0, 0]] }] }, /a line goes through a point that is not there/],
     [{ ...header, meshes: [{}] }, /a mesh has no size/],
     [{ ...header, live: true }, /running simulation/],
     ['nonsense', /not an object/],

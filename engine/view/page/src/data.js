@@ -52,12 +52,16 @@ function parseHeader(text) {
   for (const name of ['instances', 'frames', 'parts']) {
     if (!Number.isSafeInteger(header[name]) || header[name] < 0) throw damaged(`its header says ${name}: ${JSON.stringify(header[name])}`);
   }
-  for (const name of ['bodies', 'joints', 'parents', 'meshes', 'links', 'curves']) {
+  for (const name of ['bodies', 'joints', 'parents', 'meshes', 'links', 'lines', 'curves']) {
     if (!Array.isArray(header[name])) throw damaged(`its header has no list of ${name}`);
   }
   const bodies = header.bodies.length;
   if (header.joints.length !== bodies || header.parents.length !== bodies) throw damaged('bodies, joints and parents differ in number');
   if (header.links.length !== header.parts) throw damaged('parts and links differ in number');
+  for (const { points } of header.lines) {
+    const isPoint = (point) => Array.isArray(point) && point.length === 4 && point.every(Number.isFinite) && point[0] >= 0 && point[0] <= bodies;
+    if (!Array.isArray(points) || points.length < 2 || !points.every(isPoint)) throw damaged('a line goes through a point that is not there');
+  }
   for (const { points, triangles } of header.meshes) {
     if (![points, triangles].every((count) => Number.isSafeInteger(count) && count >= 0)) throw damaged('a mesh has no size');
   }

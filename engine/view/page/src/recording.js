@@ -22,6 +22,7 @@ export function makeRecording({ header, sections, meshes }) {
     bodies: header.bodies.map(String),
     joints: header.joints.map(String),
     parents: header.parents,
+    lines: header.lines,
     frames: header.frames,
     times,
     duration: times[times.length - 1],

@@ -7,11 +7,11 @@ import { DataError } from './data.js';
 export const themes = {
   light: {
     sky: '#f3f3f0', floor: '#e7e7e3', line: '#c3c4c0', shadow: 0.2, bounce: '#b9b5ad', ambient: 0.85, force: '#d2541b', mark: '#e08a00',
-    thread: '#2f5d8a',
+    thread: '#2f5d8a', cable: '#3d3a36',
   },
   dark: {
     sky: '#15171a', floor: '#1e2124', line: '#3a3f44', shadow: 0.42, bounce: '#3c4046', ambient: 0.6, force: '#ff8a4c', mark: '#ffb02e',
-    thread: '#8fb8de',
+    thread: '#8fb8de', cable: '#c9c4ba',
   },
 };
 

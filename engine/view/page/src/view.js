@@ -7,6 +7,7 @@ import { makeBodies } from './bodies.js';
 import { makeCamera } from './camera.js';
 import { boxOfAll, extentOf, offsetsOf } from './extent.js';
 import { makeGround } from './ground.js';
+import { makeLines } from './lines.js';
 import { momentOf, poseSize } from './recording.js';
 import { makePullLines } from './pulling.js';
 import { makeStage, themes } from './stage.js';
@@ -36,9 +37,10 @@ export class View {
     this.axes = makeAxes(recording, this.extent.size, this.poses);
     this.arrows = makeArrows(recording, this.extent.size);
     this.threads = makeThreads(recording);
+    this.lines = makeLines(recording);
     this.pullLines = recording.live ? makePullLines(recording) : null;
     this.camera = makeCamera(canvas, changed);
-    this.stage.scene.add(this.ground.object, this.arrows.object, this.threads.object, ...this.bodies.groups.map(({ object }) => object));
+    this.stage.scene.add(this.ground.object, this.arrows.object, this.threads.object, this.lines.object, ...this.bodies.groups.map(({ object }) => object));
     if (this.pullLines) this.stage.scene.add(this.pullLines.object);
     const hasLayer = (layer) => recording.parts.some((part) => part.layer === layer);
     /** Layers that this recording has something of. */
@@ -67,6 +69,7 @@ export class View {
     this.axes.place(this.bodies.places, this.bodies.slots);
     this.arrows.place(moment.frame, this.offsets);
     this.threads.place(this.bodies.places, this.bodies.slots);
+    this.lines.place(this.bodies.places, this.bodies.slots);
     this.pullLines?.place();
     this.camera.carry(this.follow ? this.bodies.originInto(this.follow.body, this.follow.instance, place) : null);
     this.#moved = false;
@@ -89,6 +92,7 @@ export class View {
     this.axes.show(this.layers.frames);
     if (this.layers.frames) this.stage.scene.add(this.axes.object());
     this.arrows.object.visible = this.layers.forces;
+    this.lines.show(this.layers);
     this.ground.object.visible = this.layers.ground;
     this.stage.shadows(this.layers.shadows);
     this.#restart();
@@ -128,6 +132,7 @@ export class View {
     this.ground.colour(this.#theme);
     this.arrows.colour(this.#theme);
     this.threads.colour(this.#theme);
+    this.lines.colour(this.#theme);
     this.pullLines?.colour(this.#theme);
     this.bodies.mark(this.selection, new Color(this.#theme.mark));
     this.changed();
