@@ -122,7 +122,7 @@ void StartCheck::look_at_ties(StartFindings& found) const {
 void StartCheck::look_at_limits(StartFindings& found) const {
   if (plan_->effects.limits.empty()) return;
   const std::unordered_map<Index, Index> screws = screws_of(model_);
-  std::vector<std::string> lines;
+  std::vector<std::string> lines, cables;
   for (const JointLimit& limit : plan_->effects.limits) {
     const Index slot = screws.at(limit.row);
     double& q = found.positions[at(model_.tree.first_q(slot))];
@@ -130,6 +130,15 @@ void StartCheck::look_at_limits(StartFindings& found) const {
     if (!(beyond > 0)) continue;
     const std::string name = quoted(model_.names.velocity[at(limit.row)]);
     const std::string_view unit = unit_of(model_, slot);
+    const bool is_cable = std::ranges::any_of(model_.couplings, [&](const Coupling& coupling) {
+      return coupling.kind == CouplingKind::cable && coupling.terms.front().v_row == limit.row;
+    });
+    if (is_cable) {
+      if (beyond <= kPositionRounding * std::max(1.0, std::abs(bound))) continue;  // it cannot be moved: its length is what it is
+      found.faults.push_back(fmt::format("cable {} is {:.10g} m long, outside its limits ({})", name, q, range_text(limit.lower, limit.upper, unit)));
+      cables.push_back(fmt::format("{}", name));
+      continue;
+    }
     if (beyond <= std::max(kPositionRounding, kWrittenDigits * std::abs(bound))) {
       found.moved.push_back(fmt::format("joint {} starts at {:.10g} {}, {:.2g} beyond its limit; moved onto it, {:.10g}", name, q, unit, beyond, bound));
       q = bound;
@@ -141,6 +150,7 @@ void StartCheck::look_at_limits(StartFindings& found) const {
   if (!lines.empty()) {
     found.advice.push_back(fmt::format("write initial: {{positions: {{{}}}}} or what else lies within, or change effects.limits", fmt::join(lines, ", ")));
   }
+  if (!cables.empty()) found.advice.push_back(fmt::format("give another length to {}, or other places to what hangs on it", fmt::join(cables, ", ")));
   if (!found.moved.empty()) follow(found.positions);
 }
 

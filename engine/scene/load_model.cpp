@@ -42,8 +42,8 @@ void require_memory(const std::string& what, double bytes) {
 
 double memory_of(const std::string& name) {
   constexpr double kBytesPerBody = 2600;      // of building and simulating chain:1000000
-  constexpr double kBytesPerRow = 1000;       // of couplings, likewise of ladder:30000
-  constexpr double kBytesPerPairOfRows = 16;  // of those that are solved together: two matrices
+  constexpr double kBytesPerRow = 1800;       // of couplings, likewise of ladder:30000
+  constexpr double kBytesPerPairOfRows = 32;  // of those that are solved together: two matrices, of steps and of all else
   const GeneratedSize size = generated_size(name);
   return size.bodies * kBytesPerBody + size.rows * (kBytesPerRow + size.together * kBytesPerPairOfRows);
 }

@@ -66,10 +66,11 @@ class SceneReader {
     if (const auto rule = root_.find("start")) scene_.start_as_given = rule->choice(kStarts) == "as given";
     Effects limited;
     if (effects) limited.limits = read_limits(*effects, scene_.model);
-    limited.limits.insert(limited.limits.end(), cable_ends_.limits.begin(), cable_ends_.limits.end());
     if (initial) refuse_lengths(*initial);
     scene_.initial = read_start(initial, scene_.model, bases_, given_, limited.limits);
     close_couplings(initial);
+    fit_cables();
+    limited.limits.insert(limited.limits.end(), cable_ends_.limits.begin(), cable_ends_.limits.end());
     require_finite(initial.value_or(root_), "position", scene_.initial.positions, scene_.model.names.position);
     require_finite(initial.value_or(root_), "velocity", scene_.initial.velocities, scene_.model.names.velocity);
     if (!scene_.start_as_given && !limited.limits.empty()) move_onto_limits(limited, initial ? initial->place() : file_);
@@ -91,6 +92,23 @@ class SceneReader {
   }
 
  private:
+  /// A length that is less than the links are apart because of the digits it was written with is theirs.
+  void fit_cables() {
+    constexpr double kRounding = 1e-9;
+    for (const Coupling& coupling : scene_.model.couplings) {
+      if (coupling.kind != CouplingKind::cable) continue;
+      const GearTerm& term = coupling.terms.front();
+      const double length = scene_.initial.positions[static_cast<std::size_t>(term.q_row)];
+      for (JointLimit& end : cable_ends_.limits) {
+        if (end.row != term.v_row || !(length > end.upper) || length - end.upper > kWrittenDigits * length) continue;
+        if (length - end.upper > kRounding * length) {
+          scene_.model.warnings.push_back(fmt::format("{}: cable {} starts {:.2g} m longer than its length; that is taken to be {:.10g} m", file_,
+                                                      quoted(coupling.name), length - end.upper, length));
+        }
+        end.upper = length;
+      }
+    }
+  }
   /// Where cables are taut, beside the effects that the scene names.
   void add_cable_ends(const std::optional<SceneValue>& effects) {
     for (const JointLimit& end : cable_ends_.limits) {

@@ -6,6 +6,7 @@
 #include "engine/mobility.hpp"
 #include "engine/scene/scene_file.hpp"
 #include "engine/simulation.hpp"
+#include "engine/start_check.hpp"
 #include "tests/engine/mechanisms.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -114,6 +115,15 @@ TEST_CASE("a cable comes to its length and no farther, or stretches from there, 
   const Scene moved = with(cable + ", length: 5}", "initial: {positions: {crank: 0.2}}");
   CHECK(at(Simulation(moved), "rope") == Approx(std::hypot(1 - std::sin(0.2), 3 - std::cos(0.2)) + std::hypot(2 - std::sin(0.2), 2 - std::cos(0.2))).epsilon(1e-14));
   CHECK(at(Simulation(moved), "crank") == 0.2);
+  const Scene written = with(cable + ", length: 5.2}", "initial: {positions: {crank: -0.01}}");
+  CHECK(written.model.warnings.empty());
+  const double there = at(Simulation(written), "rope");
+  const Scene rounded = with(fmt::format("{}, length: {:.4f}}}", cable, there - 1e-4), "initial: {positions: {crank: -0.01}}");
+  REQUIRE(rounded.model.warnings.size() == 1);
+  CHECK_THAT(rounded.model.warnings[0], Catch::Contains("cable \"rope\" starts") && Catch::Contains("longer than its length"));
+  CHECK(rounded.effects.limits[0].upper == Approx(there).epsilon(1e-14));
+  CHECK_THROWS_WITH(checked_start(with(cable + ", length: 4}")), Catch::Contains("cable \"rope\" is 4.47") && Catch::Contains("outside its limits (at most 4 m)") &&
+                                                                       Catch::Contains("give another length to \"rope\""));
   const Scene free = with("{type: cable, name: rope, joint: tendon, between: [world, crank], points: [[1, 0, 3], [0, 0, 1]]}");
   CHECK(free.effects.limits.empty());
   CHECK(free.model.names.slot_of_joint.contains("tendon"));
