@@ -1,7 +1,7 @@
 // Rows of couplings where bodies are: gaps, and how joints change them.
 //
 //   place       q^k: gaps, and G on the paths
-//   find_gaps   q^k+1: gaps, and J on the paths
+//   find_gaps   q^k+1: gaps, and J on the paths where it is asked for: a factor is made of it
 //
 // Bodies of a coupling are placed from the body that both hang on, joint by joint: what is rounded on the way from the world is of no account to
 // a gap, at the end of a rope of a thousand cells as at its beginning.
@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,9 @@
 #include "layout/model.hpp"
 
 namespace linden {
+
+/// What is asked of the end of a step.
+enum class Asked : std::uint8_t { gaps, rows };
 
 /// Side: of rows in memory.
 template <class S, class Side = RowLanes<S, RowPack<S>>>
@@ -54,15 +58,15 @@ class CouplingRows {
     for (std::size_t term = 0; const CouplingPath& path : paths_.all()) {
       for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
     }
-    look([&](auto, Index slot) { return load<Placement, S>(placement, slot); }, [](Index) { return S(0.0); }, begin_, !keeps_scales_);
+    look([&](auto, Index slot) { return load<Placement, S>(placement, slot); }, [](Index) { return S(0.0); }, &begin_, !keeps_scales_);
   }
   /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
   void keep_scales(bool keep) { keeps_scales_ = keep; }
 
-  /// Gaps at the end of motions of the joints, and how joints change them there.
-  void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta) {
+  /// Gaps at the end of motions of the joints and, where rows are asked for, how joints change them there.
+  void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta, Asked asked) {
     look([&](auto joint, Index slot) { return after_motion(joint, load<Placement, S>(placement, slot), load_motion(joint, motion, slot)); },
-         [&](Index row) { return delta(row); }, end_, false);
+         [&](Index row) { return delta(row); }, asked == Asked::rows ? &end_ : nullptr, false);
   }
 
   /// Of each row [m], or without a unit; by what it is judged; 1 / root of how far it would move were its bodies free.
@@ -135,10 +139,10 @@ class CouplingRows {
     const S zero(0.0), one(1.0);
     return number >= 0 ? load<Placement, S>(pose_, number) : Placement<S>{{{one, zero, zero}, {zero, one, zero}, {zero, zero, one}}, {zero, zero, zero}};
   }
-  /// Gaps where bodies are placed by their joints and coordinates moved by delta(row), and how joints change them; scales as well where it is
-  /// asked.
+  /// Gaps where bodies are placed by their joints and coordinates moved by delta(row), and how joints change them where there are numbers for it;
+  /// scales as well where it is asked.
   template <class PlacementOf, class DeltaOf>
-  void look(const PlacementOf& placement, const DeltaOf& delta, std::vector<S>& numbers, bool scales) {
+  void look(const PlacementOf& placement, const DeltaOf& delta, std::vector<S>* numbers, bool scales) {
     using std::sqrt;
     std::size_t term = 0;
     for (const CouplingPath& path : paths_.all()) {
@@ -147,7 +151,7 @@ class CouplingRows {
         S& gap = gap_[path.first_row] = as<S>(coupling.offset);
         for (std::size_t k = 0; k < coupling.terms.size(); ++k, ++term) {
           gap = gap + as<S>(coupling.terms[k].ratio) * (at_start_[term] + delta(coupling.terms[k].v_row));
-          numbers[path.first_velocity + path.terms[k] * path.room] = as<S>(coupling.terms[k].ratio);
+          if (numbers) (*numbers)[path.first_velocity + path.terms[k] * path.room] = as<S>(coupling.terms[k].ratio);
         }
         if (scales) scale_[path.first_row] = as<S>(1 / std::sqrt(path.least_yield));
         continue;
@@ -172,14 +176,14 @@ class CouplingRows {
         gaps[j] = gap_of(kinds[j], coupling.length, A, B);
         gap_[path.first_row + j] = gaps[j].gap;
       }
-      for (std::size_t k = 0; k < path.joints.size(); ++k) {
+      for (std::size_t k = 0; numbers && k < path.joints.size(); ++k) {
         const CouplingPath::Joint& on = path.joints[k];
         if (on.sign == 0) continue;
         with_joint(model_.tree.kind(on.slot), [&](auto joint) {
           for (std::size_t j = 0; j < kinds.size(); ++j) {
             S along[6];
             gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), B.p, gaps[j], as<S>(on.sign), along);
-            S* const to = &numbers[path.first_velocity + static_cast<std::size_t>(on.at) * path.room + j];
+            S* const to = &(*numbers)[path.first_velocity + static_cast<std::size_t>(on.at) * path.room + j];
             for (std::size_t n = 0; n < static_cast<std::size_t>(velocity_count(joint)); ++n) to[n * path.room] = along[n];
           }
         });
@@ -193,7 +197,7 @@ class CouplingRows {
   }
 
   /// The same of a cable whose bodies are placed, and whose length is to be this.
-  void look_along(const CouplingPath& path, const S& length, std::vector<S>& numbers, bool scales) {
+  void look_along(const CouplingPath& path, const S& length, std::vector<S>* numbers, bool scales) {
     using std::max, std::sqrt;
     const Vec3<S> none{S(0.0), S(0.0), S(0.0)};
     const std::vector<CablePoint>& points = path.coupling->points;
@@ -218,6 +222,7 @@ class CouplingRows {
       }
       from = x;
     }
+    if (!numbers) return;
     for (Index k = 0; k < static_cast<Index>(path.joints.size()); ++k) store(pull_, k, Wrench<S>{none, none});
     for (std::size_t k = 0; k < ends_.size(); ++k) add_pull(path.ends[k].at, {ends_[k].couple, ends_[k].force});
     for (std::size_t k = 0; k < path.joints.size(); ++k) {
@@ -228,11 +233,11 @@ class CouplingRows {
       with_joint(model_.tree.kind(on.slot), [&](auto joint) {
         S along[6];
         gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), none, Gap<S>{gap, pull.f, pull.n}, as<S>(on.sign), along);
-        S* const to = &numbers[path.first_velocity + static_cast<std::size_t>(on.at) * path.room];
+        S* const to = &(*numbers)[path.first_velocity + static_cast<std::size_t>(on.at) * path.room];
         for (std::size_t n = 0; n < static_cast<std::size_t>(velocity_count(joint)); ++n) to[n * path.room] = along[n];
       });
     }
-    numbers[path.first_velocity + path.terms.front() * path.room] = S(-1.0);
+    (*numbers)[path.first_velocity + path.terms.front() * path.room] = S(-1.0);
     if (!scales) return;
     S moves = as<S>(path.least_yield);
     for (std::size_t k = 0; k < ends_.size(); ++k) moves = moves + moved(path.ends[k], ends_[k], none);

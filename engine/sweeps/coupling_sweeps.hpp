@@ -122,9 +122,9 @@ class CouplingSweeps {
       history_(row, 0) = lambda_[at] + increment_[at];
     }
   }
-  /// Gaps at the end of motions of the joints, and how joints change them there.
-  void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta) {
-    if (!empty()) rows_.find_gaps(placement, motion, delta);
+  /// Gaps at the end of motions of the joints; rows: and how joints change them there, before a factor is made.
+  void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta, Asked asked) {
+    if (!empty()) rows_.find_gaps(placement, motion, delta, gives_way() ? Asked::rows : asked);
   }
 
   /// sweep(slots) of all bodies, leaves to root, in parts: at(closure) once all bodies beyond that where it closes have been met, and it has

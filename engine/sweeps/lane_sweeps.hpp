@@ -156,7 +156,7 @@ class LaneSweeps {
       now = evaluated(moved, due, 0);
     } else {
       start_down(tree_, constants_, work_);
-      find_gaps();
+      find_gaps(due != 0 ? Asked::rows : Asked::gaps);
       if (due != 0) make_factor(due, Jacobian::first_order);
       now.norm = pass_up();
     }
@@ -229,7 +229,7 @@ class LaneSweeps {
     const Mask moves = L::mask(done);
     if constexpr (kEffects) effects_.end(block, done, work_);
     if (couplings_.gives_way()) {
-      find_gaps();  // of lanes that were brought back
+      find_gaps(Asked::rows);  // of lanes that were brought back
       couplings_.end(step_);
     }
     advance(moves);
@@ -296,7 +296,7 @@ class LaneSweeps {
   /// The upward half, with a factor made anew to first order in some lanes, exactly in others.
   Evaluated<Pack> evaluated(const Evaluation<Pack>& moved, Lanes first_order, Lanes exact) {
     Evaluated<Pack> now{.least_w = moved.least_w, .energy = moved.energy};
-    find_gaps();
+    find_gaps((first_order | exact) != 0 ? Asked::rows : Asked::gaps);
     if constexpr (kEffects) effects_.act(constants_, work_, now.energy);
     if (first_order != 0) make_factor(first_order, Jacobian::first_order);
     if (exact != 0) make_factor(exact, Jacobian::exact);
@@ -366,7 +366,7 @@ class LaneSweeps {
   bool is_solved() { return tied() || coupled(); }
 
   // what couplings do (coupling_sweeps.hpp); not inline, as above
-  [[gnu::noinline]] void find_gaps() { couplings_.find_gaps(work_.placement, work_.motion, work_.delta); }
+  [[gnu::noinline]] void find_gaps(Asked asked) { couplings_.find_gaps(work_.placement, work_.motion, work_.delta, asked); }
   [[gnu::noinline]] void close(std::size_t closure, Coupled of, const Gains<Pack>& gains, const Mask& lanes) {
     const std::array<Pack, 36> felt =
         couplings_.close(closure, of, constants_, work_.placement, of == Coupled::step ? &work_.motion : nullptr, gains, factor_.fresh_ties(), lanes);

@@ -302,7 +302,9 @@ void Writer::evaluation() {
   }, draft_.strategy.order == Order::long_chain ? Way::parents_up : Way::down);
   if (couplings()) {
     add(When::evaluation, "couplings: gaps", "screw, placement, motion, delta, couplings", "couplings",
-        [](Memory m, Slots) { m.couplings.find_gaps(m.work.placement, m.work.motion, m.work.delta); });
+        [](Memory m, Slots) {
+          m.couplings.find_gaps(m.work.placement, m.work.motion, m.work.delta, m.factor == Factor::fresh ? Asked::rows : Asked::gaps);
+        });
   }
   add_action_of_effects(draft_);
   std::string added = draft_.plan.joints ? ", joint impulses" : "";

@@ -79,7 +79,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
   before_up(all_slots(model_.tree), now);
   take_multipliers();
   now.scale = now.energy;
-  couplings_.find_gaps(work_.placement, work_.motion, work_.delta);
+  couplings_.find_gaps(work_.placement, work_.motion, work_.delta, factor == Factor::fresh ? Asked::rows : Asked::gaps);
   act(now);
   pass_up(now, factor);
   return now;
@@ -165,6 +165,7 @@ void TreeSweeps<kEffects>::factor_again(Evaluated<double>& now, StepReport& repo
   report.factorisations += 1;
   if (!strategy_.one_pass) {
     if (!couplings_.empty()) couplings_.add_push(work_.residual);
+    couplings_.find_gaps(work_.placement, work_.motion, work_.delta, Asked::rows);
     factor();
     now.norm = pass_residual();
     return;

@@ -71,7 +71,7 @@ class Solve {
     CouplingSweeps<double> couplings(model_, {}, Serves::till_the_next, closing);
     couplings.place(work_.placement, q_);
     couplings.begin(1e-3);
-    couplings.find_gaps(work_.placement, work_.motion, work_.delta);
+    couplings.find_gaps(work_.placement, work_.motion, work_.delta, Asked::rows);
     couplings.up_to_closures(
         [&](Slots part) {
           newton_factor_up(tree, model_.constants, work_.placement, work_.motion, work_.displacement, part, work_.articulated, gains, NothingAdded{});
@@ -100,7 +100,7 @@ class Solve {
   VectorXd by_dense_matrix() {
     CouplingRows<double> rows(model_, Closing::nearest);
     rows.place(work_.placement, q_);
-    rows.find_gaps(work_.placement, work_.motion, work_.delta);
+    rows.find_gaps(work_.placement, work_.motion, work_.delta, Asked::rows);
     const MatrixXd A = reference::dense_jacobian(model_, work_.placement, work_.motion);
     const Index n = model_.tree.shape.velocities, m = static_cast<Index>(rows.count());
     MatrixXd whole = MatrixXd::Zero(n + m, n + m);
