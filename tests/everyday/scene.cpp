@@ -322,7 +322,13 @@ class Maker {
     if (spec.through.size() < 2 || through.size() < 2) return;
     const auto tied = std::make_shared<const Model>(coupled(*scene_.model, {spec}));
     InitialState start = start_in(*tied);
-    const GearTerm& length = tied->couplings.back().terms.front();
+    for (const Mimic& mimic : tied->mimics) {
+      const auto q = [&](Index row) -> double& { return start.positions[static_cast<std::size_t>(row)]; };
+      const auto v = [&](Index row) -> double& { return start.velocities[static_cast<std::size_t>(row)]; };
+      q(mimic.follower_q) = mimic.multiplier * q(mimic.leader_q) + mimic.offset;
+      v(mimic.follower_v) = mimic.multiplier * v(mimic.leader_v);
+    }
+    const GearTerm length = tied->couplings.back().terms.front();
     const reference::PlainTree tree = reference::plain_tree(*tied);
     const reference::PlainCouplings rows(tree, tied->couplings);
     const auto vector_of = [](const std::vector<double>& numbers) { return VectorXd(Eigen::Map<const VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()))); };

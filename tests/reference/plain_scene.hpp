@@ -75,10 +75,21 @@ class PlainScene {
   VectorXd acceleration() const { return acceleration_at(q, v, time, {time, time}); }
 
   /// What each row's velocity weighs where all others are free to move [kg m^2, kg].
-  /// Infinite where the motion is given.
+  /// Infinite where the motion is given. The length of a cable weighs what the cable moves.
   VectorXd row_inertia() const {
     const MatrixXd M = fixed_->Z.transpose() * mass_matrix() * fixed_->Z;
-    return (fixed_->Z * M.ldlt().solve(fixed_->Z.transpose())).diagonal().cwiseInverse();
+    const Eigen::LDLT<MatrixXd> factor = M.ldlt();
+    VectorXd inertia = (fixed_->Z * factor.solve(fixed_->Z.transpose())).diagonal().cwiseInverse();
+    if (fixed_->cables.empty()) return inertia;
+    MatrixXd C = fixed_->cables.opening(q);
+    for (std::size_t k = 0; k < fixed_->lengths.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      C(row, fixed_->lengths[k]) = 0;
+      const VectorXd pulls = fixed_->Z.transpose() * C.row(row).transpose();
+      const double moved = pulls.dot(factor.solve(pulls));
+      if (moved > 0) inertia[fixed_->lengths[k]] += 1 / moved;
+    }
+    return inertia;
   }
 
   /// Stiffest of the joints' own rates [1/s], those beyond dead zones too: roots of stiffness, and damping, over inertia.
@@ -139,9 +150,15 @@ class PlainScene {
 
  private:
   struct Fixed {
+    static std::vector<Coupling> cables_of(const Model& model) {
+      std::vector<Coupling> cables;
+      std::ranges::copy_if(model.couplings, std::back_inserter(cables), [](const Coupling& one) { return one.kind == CouplingKind::cable; });
+      return cables;
+    }
     Fixed(const Model& model, const Effects& given, const std::array<double, 3>& g)
         : tree(plain_tree(model)), effects(given), mimics(model.mimics), gravity(vector_of(g)), forces(tree, effects, g), couplings(tree, model.couplings),
-          springs(tree, model.couplings, Rows::giving_way) {
+          springs(tree, model.couplings, Rows::giving_way), cables(tree, cables_of(model)) {
+      for (const Coupling& cable : cables_of(model)) lengths.push_back(cable.terms.front().v_row);
       std::vector<const Mimic*> follows(static_cast<std::size_t>(tree.velocities), nullptr);
       for (const Mimic& mimic : mimics) follows[static_cast<std::size_t>(mimic.follower_v)] = &mimic;
       Z = MatrixXd::Zero(tree.velocities, model.degrees_of_freedom() - static_cast<Index>(effects.motions.size()));
@@ -179,6 +196,8 @@ class PlainScene {
     Vector3d gravity;
     PlainForces forces;
     PlainCouplings couplings, springs;  // rows that are rigid, and that give way
+    PlainCouplings cables;              // of the former
+    std::vector<Index> lengths;         // of each of them, its row
     MatrixXd Z, G;  // [nv x u], [nv x w]
     std::vector<std::pair<Index, PlainCurve>> moved;  // by row
     std::vector<double> breaks;  // times at which a force jumps or bends [s]
