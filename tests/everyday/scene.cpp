@@ -321,24 +321,28 @@ class Maker {
     }
     if (spec.through.size() < 2 || through.size() < 2) return;
     const auto tied = std::make_shared<const Model>(coupled(*scene_.model, {spec}));
-    InitialState start = start_in(*tied);
-    for (const Mimic& mimic : tied->mimics) {
-      const auto q = [&](Index row) -> double& { return start.positions[static_cast<std::size_t>(row)]; };
-      const auto v = [&](Index row) -> double& { return start.velocities[static_cast<std::size_t>(row)]; };
+    scene_.start = start_in(*tied);
+    scene_.model = tied;
+    find_followers();
+    cable_ = tied->couplings.back().terms.front();
+    scene_.coupled = true;
+    measure_cable();
+  }
+  /// Its length, and how fast that changes, at the start.
+  void measure_cable() {
+    InitialState& start = scene_.start;
+    const auto q = [&](Index row) -> double& { return start.positions[static_cast<std::size_t>(row)]; };
+    const auto v = [&](Index row) -> double& { return start.velocities[static_cast<std::size_t>(row)]; };
+    for (const Mimic& mimic : model().mimics) {
       q(mimic.follower_q) = mimic.multiplier * q(mimic.leader_q) + mimic.offset;
       v(mimic.follower_v) = mimic.multiplier * v(mimic.leader_v);
     }
-    const GearTerm length = tied->couplings.back().terms.front();
-    const reference::PlainTree tree = reference::plain_tree(*tied);
-    const reference::PlainCouplings rows(tree, tied->couplings);
+    const reference::PlainTree tree = reference::plain_tree(model());
+    const reference::PlainCouplings rows(tree, model().couplings);
     const auto vector_of = [](const std::vector<double>& numbers) { return VectorXd(Eigen::Map<const VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()))); };
-    start.positions[static_cast<std::size_t>(length.q_row)] += rows.gaps(vector_of(start.positions))[0];
-    start.velocities[static_cast<std::size_t>(length.v_row)] = (rows.opening(vector_of(start.positions)) * vector_of(start.velocities))[0];
-    scene_.model = tied;
-    find_followers();
-    scene_.start = std::move(start);
-    cable_ = length;
-    scene_.coupled = true;
+    q(cable_->q_row) += rows.gaps(vector_of(start.positions))[0];
+    v(cable_->v_row) = 0;
+    v(cable_->v_row) = (rows.opening(vector_of(start.positions)) * vector_of(start.velocities))[0];
   }
   /// It does not stretch beyond a length that it has at the start, or later, or it pulls like a spring from there on.
   void hold_cable() {
@@ -347,7 +351,13 @@ class Maker {
     const Index row = cable_->v_row;
     Effects& effects = scene_.effects;
     const auto of_it = [row](const auto& entry) { return entry.row == row; };
-    if (std::ranges::any_of(effects.motions, of_it)) return;
+    // effects may have moved the start
+    const auto given = std::ranges::find(effects.motions, row, &JointMotion::row);
+    measure_cable();
+    if (given != effects.motions.end()) {
+      given->position.values.front() = scene_.start.positions[static_cast<std::size_t>(cable_->q_row)];
+      return;
+    }
     std::erase_if(effects.limits, of_it);
     std::erase_if(effects.dead_zone_springs, of_it);
     const double now = scene_.start.positions[static_cast<std::size_t>(cable_->q_row)];
