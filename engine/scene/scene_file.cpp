@@ -65,7 +65,10 @@ class SceneReader {
     const auto initial = root_.find("initial"), effects = root_.find("effects");
     if (const auto rule = root_.find("start")) scene_.start_as_given = rule->choice(kStarts) == "as given";
     Effects limited;
-    if (effects) limited.limits = read_limits(*effects, scene_.model);
+    if (effects) {
+      limited.limits = read_limits(*effects, scene_.model);
+      refuse_second_ends(*effects, limited.limits);
+    }
     if (initial) refuse_lengths(*initial);
     scene_.initial = read_start(initial, scene_.model, bases_, given_, limited.limits);
     close_couplings(initial);
@@ -85,7 +88,7 @@ class SceneReader {
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
       if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
-    add_cable_ends(effects);
+    add_cable_ends();
     scene_.seed = read_seed(initial, given_).value_or(kDefaultSeed);
     if (const auto randomize = root_.find("randomize")) read_randomize(*randomize);
     return std::move(scene_);
@@ -109,13 +112,15 @@ class SceneReader {
       }
     }
   }
-  /// Where cables are taut, beside the effects that the scene names.
-  void add_cable_ends(const std::optional<SceneValue>& effects) {
+  void refuse_second_ends(const SceneValue& effects, const std::vector<JointLimit>& limits) const {
     for (const JointLimit& end : cable_ends_.limits) {
-      if (std::ranges::find(scene_.effects.limits, end.row, &JointLimit::row) == scene_.effects.limits.end()) continue;
-      effects->fail(fmt::format("limits of {}, which has a length", quoted(scene_.model.names.velocity[static_cast<std::size_t>(end.row)])),
-                    "one of both", "leave out the length of the cable, or its limits");
+      if (std::ranges::find(limits, end.row, &JointLimit::row) == limits.end()) continue;
+      effects.fail(fmt::format("effects.limits names {}, a cable that has a length", quoted(scene_.model.names.velocity[static_cast<std::size_t>(end.row)])),
+                   "one of both", "write joint: beside the cable and leave its length out, or leave out its limits");
     }
+  }
+  /// Where cables are taut, beside the effects that the scene names.
+  void add_cable_ends() {
     const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
     add(scene_.effects.limits, cable_ends_.limits);
     add(scene_.effects.dead_zone_springs, cable_ends_.dead_zone_springs);

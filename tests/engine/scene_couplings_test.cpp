@@ -124,6 +124,8 @@ TEST_CASE("a cable comes to its length and no farther, or stretches from there, 
   CHECK(rounded.effects.limits[0].upper == Approx(there).epsilon(1e-14));
   CHECK_THROWS_WITH(checked_start(with(cable + ", length: 4}")), Catch::Contains("cable \"rope\" is 4.47") && Catch::Contains("outside its limits (at most 4 m)") &&
                                                                        Catch::Contains("give another length to \"rope\""));
+  CHECK_THROWS_WITH(parse_scene(fmt::format("model: {}\nduration: 1\ncouplings:\n  - {}, length: 5}}\neffects: {{limits: {{rope: {{upper: 4}}}}}}\n", model_file("four_bar.urdf"), cable), "s.yaml"),
+                    Catch::Contains("s.yaml:5") && Catch::Contains("effects.limits names \"rope\", a cable that has a length"));
   const Scene free = with("{type: cable, name: rope, joint: tendon, between: [world, crank], points: [[1, 0, 3], [0, 0, 1]]}");
   CHECK(free.effects.limits.empty());
   CHECK(free.model.names.slot_of_joint.contains("tendon"));
