@@ -15,7 +15,7 @@
 namespace linden {
 namespace {
 
-LinkPlace place_of(const Model& model, const std::string& link) { return link.empty() || link == "world" ? LinkPlace{} : model.names.link.at(link); }
+LinkPlace place_or_world(const Model& model, const std::string& link) { return link.empty() || link == "world" ? LinkPlace{} : model.names.link.at(link); }
 
 Index common_ancestor(const Tree& tree, Index a, Index b) {
   while (a != b) {
@@ -39,7 +39,7 @@ double least_mass(const Model& model, const std::vector<CablePoint>& points) {
 std::vector<CablePoint> points_on_bodies(const Model& model, const std::vector<CablePlace>& places) {
   std::vector<CablePoint> points;
   for (const CablePlace& place : places) {
-    const LinkPlace of_link = place_of(model, place.link);
+    const LinkPlace of_link = place_or_world(model, place.link);
     points.push_back({of_link.slot, array_of(isometry(of_link.in_body) * place.point)});
   }
   return points;
