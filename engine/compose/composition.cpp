@@ -47,7 +47,7 @@ std::span<const double> composition(int order) {
 std::string irreversible(const Effects& effects) {
   std::vector<std::string_view> refused;
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
-    if (Entry::facts.account != Account::none && !entries.empty()) refused.push_back(Entry::facts.name);
+    if (std::ranges::any_of(entries, one_way<Entry>)) refused.push_back(Entry::facts.name);
   });
   return fmt::format("{}", fmt::join(refused, ", "));
 }
@@ -55,8 +55,7 @@ std::string irreversible(const Effects& effects) {
 std::string sudden(const Effects& effects) {
   std::vector<std::string_view> found;
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
-    const auto is_sudden = [](const Entry& entry) { return settles(entry) || !Entry::facts.has_states; };
-    if (!Entry::facts.sudden.empty() && std::ranges::any_of(entries, is_sudden)) found.push_back(Entry::facts.sudden);
+    if (std::ranges::any_of(entries, jumps<Entry>)) found.push_back(Entry::facts.sudden);
   });
   return fmt::format("{}", fmt::join(found, ", "));
 }

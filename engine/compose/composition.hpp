@@ -42,7 +42,7 @@ struct Model;
 /// gamma_1, ..., gamma_s. Throws InputError for an order that is none of 2, 4, 6, 8.
 std::span<const double> composition(int order);
 
-/// The effects of a scene that cannot be taken back in time, by name, with commas: all that take or give energy. Empty: none.
+/// The effects of a scene that cannot be taken back in time, by name, with commas: what takes or gives energy one way. Empty: none.
 std::string irreversible(const Effects& effects);
 
 /// Those whose force changes suddenly with the motion, so that no explicit method has them, as their facts say: friction, limits, servos with

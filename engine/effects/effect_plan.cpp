@@ -159,6 +159,9 @@ void EffectPlan::place_joints(const Model& model) {
     if constexpr (HasRatio<Law>) asked = asked || !effects.list<typename Law::Entry>().empty();
   });
   if (asked) inertia = felt_inertia(model, effects.armature);
+  std::vector<Index> zones;
+  for (const DeadZoneSpring& spring : effects.dead_zone_springs) zones.push_back(spring.row);
+  zone_yields = joint_yields(model, effects.armature, zones);
 }
 
 void EffectPlan::place_ground(const Model& model, const Options& options) {

@@ -48,6 +48,7 @@ struct EffectPlan {
   Field<Index> q_row;               // position row of a screw's velocity row
   std::vector<SmoothCurve> curves;  // of every given motion
   std::vector<double> inertia;      // that a force on each row moves, all others free [kg m^2, kg]; empty where no law asks
+  std::vector<double> zone_yields;  // of each spring with a dead zone: how far its row moves by a unit of impulse (engine/sweeps/coupling_yields.hpp)
   std::vector<double> mass;         // that a force on each body is taken to move [kg]
   Field<double> fastest;            // limit of every row's velocity, infinite without; no rows where none has one
   Field<double> rotor;              // armature of every row; no rows without armature
@@ -56,7 +57,7 @@ struct EffectPlan {
   std::vector<LoadedBody> loaded_bodies;  // sorted by slot
 
   /// What laws are built from.
-  LawSetup setup(const Tree& tree) const { return {effects, tree, q_row, inertia, mass, curves, ground, step_}; }
+  LawSetup setup(const Tree& tree) const { return {effects, tree, q_row, inertia, zone_yields, mass, curves, ground, step_}; }
   /// Joints whose motion is given are where it is at a time [s], whatever stands in q [nq], and as fast as it goes on from there.
   void put_positions(double time, std::span<double> q) const;
   void put_velocities(double time, std::span<double> v) const;

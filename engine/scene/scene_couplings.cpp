@@ -17,7 +17,7 @@ const Keys kBodyKeys{"type",   "name",      "between", "point",             "axi
                      "frames", "joint", "stiffness", "damping", "turning_stiffness", "turning_damping"};
 const Keys kRodKeys{"type", "name", "between", "points", "length"};
 const Keys kSpringKeys{"type", "name", "between", "points", "stiffness", "damping", "rest"};
-const Keys kCableKeys{"type", "name", "between", "points", "joint", "length", "stiffness"};
+const Keys kCableKeys{"type", "name", "between", "points", "joint", "length", "stiffness", "damping"};
 const Keys kGearKeys{"type", "name", "joints", "offset", "turning_stiffness", "turning_damping"};
 const Keys kAllKeys{"type",   "name",   "between", "point",     "axis",    "second_axis", "frames",            "points",
                     "length", "joint", "joints", "offset",  "stiffness", "damping", "rest",        "turning_stiffness", "turning_damping"};
@@ -70,12 +70,18 @@ struct CableEnd {
   std::string joint;
   std::optional<double> length;  // none: as long as it is while all coordinates are zero
   double stiffness;              // [N/m]; zero: it does not stretch
+  double damping;                // of what is stretched [N s/m]
 };
 
 std::optional<CableEnd> end_of(const SceneValue& at, const CouplingSpec& spec) {
-  const auto length = at.find("length"), stiffness = at.find("stiffness");
+  const auto length = at.find("length"), stiffness = at.find("stiffness"), damping = at.find("damping");
+  if (damping && !stiffness) {
+    damping->fail(fmt::format("{} has a damping and no stiffness", at.path()), "stiffness: in N/m beside it; what does not stretch has nothing to damp",
+                  "add it, or name the cable in effects.damping, which acts while it is slack too");
+  }
   if (spec.joint && !length && !stiffness) return std::nullopt;  // what acts on the joint is all there is
-  CableEnd end{spec.joint ? spec.joint->name : spec.name, std::nullopt, stiffness ? stiffness->positive() : 0};
+  CableEnd end{spec.joint ? spec.joint->name : spec.name, std::nullopt, stiffness ? stiffness->positive() : 0,
+               damping ? damping->not_negative("a damping, zero or more") : 0};
   if (length) end.length = length->positive();
   return end;
 }
@@ -175,7 +181,7 @@ SceneCouplings read_couplings(const SceneValue& at, Model model) {
     const Index slot = read.model.names.slot_of_joint.at(end.joint), row = read.model.tree.first_v(slot);
     const double length = end.length.value_or(neutral[static_cast<std::size_t>(read.model.tree.first_q(slot))]);
     if (end.stiffness > 0) {
-      read.ends.dead_zone_springs.push_back({.row = row, .stiffness = end.stiffness, .half_width = length / 2, .rest = length / 2});
+      read.ends.dead_zone_springs.push_back({.row = row, .stiffness = end.stiffness, .half_width = length / 2, .rest = length / 2, .damping = end.damping});
     } else {
       read.ends.limits.push_back({.row = row, .upper = length});
     }

@@ -6,7 +6,7 @@
 //   damping    urdf | number (every screw and ball joint) | {joint: number}
 //   friction   urdf | number (every screw joint) | {joint: number}
 //   spring     {joint: {stiffness, rest: number, or of a ball joint quaternion}}
-//   dead_zone_spring  {joint: {stiffness, half_width, rest}}
+//   dead_zone_spring  {joint: {stiffness, half_width, rest, damping}}
 //   limits     urdf | {restitution, velocity: urdf | number} (all of the URDF's; a number on every screw joint)
 //               | {joint: urdf | {lower, upper, restitution, velocity}}
 //   servo      {stiffness, damping, max_force: urdf | none | number, targets, velocities, feedforward: {joint: over time},

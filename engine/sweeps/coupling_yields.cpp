@@ -36,48 +36,109 @@ void turn_at_random(const Model& model, Random& random, Field<double>& q) {
   for (const Mimic& mimic : model.mimics) q(mimic.follower_q) = mimic.multiplier * q(mimic.leader_q) + mimic.offset;
 }
 
+/// The mass matrix of a model, rotors included, with its couplings, factored at several configurations.
+class Configurations {
+ public:
+  Configurations(const Model& model, std::span<const Armature> rotors, Closing closing)
+      : model_(model), couplings_(model, {}, Serves::till_the_next, closing), ties_(model.mimics, model.tree) {
+    work_.allocate(model.tree.shape);
+    q_.allocate(model.tree.shape.positions);
+    rotor_.allocate(model.tree.shape.velocities, 0.0);
+    for (const Armature& one : rotors) rotor_(one.row) = one.inertia;
+  }
+
+  CouplingSweeps<double>& couplings() { return couplings_; }
+
+  /// at(): at each of them, once all is factored.
+  template <class At>
+  void visit(const At& at) {
+    const Tree& tree = model_.tree;
+    const EffectsAdded<double, true, false> added{rotor_, no_pull_};
+    for (int configuration = 0; configuration < kConfigurations; ++configuration) {
+      turn_at_random(model_, random_, q_);
+      if (configuration == 0) std::ranges::copy(model_.neutral(), q_.flat().begin());
+      placement_map(tree, model_.constants, q_, work_.placement);
+      couplings_.place(work_.placement, q_);
+      couplings_.up_to_closures([&](Slots part) { factor(part, added); }, [&](std::size_t closure) { close(closure); });
+      at();
+    }
+  }
+  /// v: what joints do by impulses r of theirs, couplings closed.
+  void apply_inverse(const Field<double>& r, Field<double>& v) {
+    const Tree& tree = model_.tree;
+    couplings_.begin_solve(Coupled::velocities);
+    couplings_.up_to_closures(
+        [&](Slots part) { impulse_pass_up(tree, model_.constants, work_.placement, gains(), r, part, work_.bias, work_.innovation); },
+        [&](std::size_t closure) { couplings_.yield(closure, Coupled::velocities, ties_, work_.innovation, work_.bias); });
+    couplings_.down_from_closures([&](Slots part) { rates_down(part, v); },
+                                  [&](std::size_t closure) { couplings_.push(closure, Coupled::velocities, work_.variation, work_.innovation); });
+    if (!ties_.empty()) ties_.complete(v);
+  }
+
+ private:
+  Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
+  void rates_down(Slots part, Field<double>& v) {
+    rate_down(model_.tree, model_.constants, work_.placement, gains(), work_.innovation, part, work_.variation, v);
+  }
+  void factor(Slots part, const EffectsAdded<double, true, false>& added) {
+    const Tree& tree = model_.tree;
+    const auto articulate = [&](const auto& all) {
+      articulated_inertia_up(tree, model_.constants, work_.placement, part, work_.articulated, gains(), all);
+    };
+    if (ties_.empty()) return articulate(added);
+    articulate(ties_.held(added));
+    ties_.factor(
+        [&](const Field<double>& r, Field<double>& x) {
+          impulse_pass_up(tree, model_.constants, work_.placement, gains(), r, work_.bias, work_.innovation);
+          rates_down(part, x);
+        },
+        [&](Index i) { return tied_load(tree, model_.constants, gains(), work_.bias, work_.variation, i); }, work_.increment);
+  }
+  void close(std::size_t closure) {
+    const std::array<double, 36> felt =
+        couplings_.close(closure, Coupled::velocities, model_.constants, work_.placement, nullptr, gains(), ties_, true);
+    if (const Index slot = couplings_.slot_of(closure); slot != 0) add_inertia(slot, felt, work_.articulated);
+  }
+
+  const Model& model_;
+  CouplingSweeps<double> couplings_;
+  MimicTies<double> ties_;
+  Workspace<double> work_;
+  Field<double> q_, rotor_;
+  Field<double, 36> no_pull_;
+  Random random_{1};
+};
+
 }  // namespace
 
 std::vector<double> row_yields(const Model& model, std::span<const Armature> rotors) {
   if (std::ranges::none_of(model.couplings, gives_way)) return {};
-  const Tree& tree = model.tree;
-  CouplingSweeps<double> couplings(model, {}, Serves::till_the_next, Closing::at_world);
-  Workspace<double> work;
-  work.allocate(tree.shape);
-  Field<double> q, rotor;
-  Field<double, 36> no_pull;
-  q.allocate(tree.shape.positions);
-  rotor.allocate(tree.shape.velocities, 0.0);
-  for (const Armature& one : rotors) rotor(one.row) = one.inertia;
-  const EffectsAdded<double, true, false> added{rotor, no_pull};
-  const Gains<double> gains{work.gain_up, work.gain_down, work.joint_inverse};
-  MimicTies<double> ties(model.mimics, tree);
+  Configurations configurations(model, rotors, Closing::at_world);
+  const CouplingSweeps<double>& couplings = configurations.couplings();
   std::vector<double> yields(couplings.rows(), 0.0);
-  Random random(1);
-  for (int configuration = 0; configuration < kConfigurations; ++configuration) {
-    turn_at_random(model, random, q);
-    if (configuration == 0) std::ranges::copy(model.neutral(), q.flat().begin());
-    placement_map(tree, model.constants, q, work.placement);
-    if (ties.empty()) {
-      articulated_inertia_up(tree, model.constants, work.placement, work.articulated, gains, added);
-    } else {
-      articulated_inertia_up(tree, model.constants, work.placement, work.articulated, gains, ties.held(added));
-      ties.factor(
-          [&](const Field<double>& r, Field<double>& x) {
-            impulse_pass_up(tree, model.constants, work.placement, gains, r, work.bias, work.innovation);
-            rate_down(tree, model.constants, work.placement, gains, work.innovation, work.variation, x);
-          },
-          [&](Index i) { return tied_load(tree, model.constants, gains, work.bias, work.variation, i); }, work.increment);
-    }
-    couplings.place(work.placement, q);
-    couplings.up_to_closures([](Slots) {}, [&](std::size_t closure) {
-      couplings.close(closure, Coupled::velocities, model.constants, work.placement, nullptr, gains, ties, true);
-    });
+  configurations.visit([&] {
     for (std::size_t row = 0; row < yields.size(); ++row) {
       const double yield = couplings.yield(row);
       if (std::isfinite(yield)) yields[row] = std::max(yields[row], yield);
     }
-  }
+  });
+  return yields;
+}
+
+std::vector<double> joint_yields(const Model& model, std::span<const Armature> rotors, std::span<const Index> rows) {
+  if (rows.empty()) return {};
+  Configurations configurations(model, rotors, Closing::nearest);
+  std::vector<double> yields(rows.size(), 0.0);
+  Field<double> impulse, moved;
+  for (Field<double>* field : {&impulse, &moved}) field->allocate(model.tree.shape.velocities, 0.0);
+  configurations.visit([&] {
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      impulse(rows[k]) = 1;
+      configurations.apply_inverse(impulse, moved);
+      impulse(rows[k]) = 0;
+      if (std::isfinite(moved(rows[k]))) yields[k] = std::max(yields[k], moved(rows[k]));
+    }
+  });
   return yields;
 }
 

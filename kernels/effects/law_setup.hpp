@@ -16,6 +16,7 @@ struct LawSetup {
   const Tree& tree;
   const Field<Index>& q_row;         // position row of a screw's velocity row; no rows where nothing acts on joints
   std::span<const double> inertia;   // that a force on each joint's row moves, all others free; empty where no law asks
+  std::span<const double> zone_yields;  // how far the row of each spring with a dead zone moves by an impulse of one (engine/sweeps/coupling_yields.hpp)
   std::span<const double> mass;      // that a force on each body is taken to move
   std::span<const SmoothCurve> curves;  // of every given motion
   const GroundPlan& ground;

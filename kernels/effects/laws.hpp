@@ -121,7 +121,8 @@ consteval void require_joint_parts() {
     static_assert(requires(const typename Law::Entry& entry, const JointsView<S>& at) { { Law::potential(entry, at) } -> std::same_as<S>; },
                   "the facts say that the effect stores energy: give its law `potential`, as in law.hpp");
   }
-  if constexpr (facts.sudden.empty() || requires(const typename Law::Entry& entry) { entry.settles(); }) {
+  if constexpr (facts.sudden.empty() || requires(const typename Law::Entry& entry) { entry.settles(); } ||
+                requires(const typename Law::Entry& entry) { entry.jumps(); }) {
     static_assert(requires(const typename Law::Entry& entry, const Instant& now, Field<double>& force) { Law::push(entry, now, force); },
                   "what is not sudden is a force at every instant: give the law `push`, as in law.hpp, or say in its facts what is sudden");
   }

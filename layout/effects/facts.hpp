@@ -19,7 +19,8 @@ namespace linden {
 enum class Site : std::uint8_t { joint, body };
 
 /// What becomes of the energy that an effect exchanges: nothing, as the effect keeps or stores it; or it is booked, as taken by what can
-/// only take, or as given by what drives. A step of an order above 2 goes back in time between whiles, where only the first have a place.
+/// only take, or as given by what drives. A step of an order above 2 goes back in time between whiles, where only the first have a place, and
+/// entries of which one_way() is not true: what they take they take either way.
 enum class Account : std::uint8_t { none, taken, given };
 
 struct EffectFacts {
@@ -31,7 +32,8 @@ struct EffectFacts {
   bool single = false;             // no two entries on one joint
   bool on_balls = false;           // beside joints about or along one axis ball joints can have it, an entry a row
   bool has_states = false;         // of which one holds is settled within the solve; an entry's settles() may say: not for this one
-  std::string_view sudden = {};    // what of it jumps, in words; empty where its force is a continuous function of positions and velocities
+  std::string_view sudden = {};    // what of it jumps, in words; empty where its force is a continuous function of positions and velocities;
+                                   // an entry's jumps() may say: not of this one
 };
 
 /// Whether states of this entry are settled within the solve.
@@ -41,6 +43,26 @@ constexpr bool settles(const Entry& entry) {
     return entry.settles();
   } else {
     return Entry::facts.has_states;
+  }
+}
+
+/// Whether steps back in time would return what this entry takes or gives, so that orders above 2 have no place for it.
+template <class Entry>
+constexpr bool one_way(const Entry& entry) {
+  if constexpr (requires { entry.one_way(); }) {
+    return entry.one_way();
+  } else {
+    return Entry::facts.account != Account::none;
+  }
+}
+
+/// Whether the force of this entry jumps with the motion.
+template <class Entry>
+constexpr bool jumps(const Entry& entry) {
+  if constexpr (requires { entry.jumps(); }) {
+    return entry.jumps();
+  } else {
+    return !Entry::facts.sudden.empty() && (settles(entry) || !Entry::facts.has_states);
   }
 }
 

@@ -162,6 +162,81 @@ TEST_CASE("A weight on an elastic cable bounces with the period of its spring an
   CHECK(-lowest(2e-4) == Approx(exact).epsilon(2e-4));
 }
 
+TEST_CASE("A weight caught by an elastic cable never gains, at any stiffness, step and mass", "[cable]") {
+  constexpr double kFall = 0.5;
+  for (const double mass : {1e-3, 1.0, 200.0}) {
+    const Model model = hanging(mass);
+    for (const double step : {1e-4, 1e-3, 1e-2}) {
+      for (double stiffness = 1e4; stiffness < 2e9; stiffness *= 10) {
+        CAPTURE(mass, step, stiffness);
+        Effects effects;
+        effects.dead_zone_springs.push_back({.row = length_row(model), .stiffness = stiffness, .half_width = 0.5, .rest = 0.5});
+        Simulation simulation(model, {.step = step}, effects);
+        move(simulation, 0, kFall);
+        const double before = simulation.energy().total(), scale = mass * kGravity * kFall;
+        double most = before;
+        for (int k = 0; k < 2000; ++k) {
+          REQUIRE(simulation.step().ok());
+          most = std::max(most, simulation.energy().total());
+        }
+        CHECK(most - before < 1e-6 * scale);
+        CHECK(simulation.passive_gifts().empty());
+        CHECK(simulation.energy().total() + simulation.effect_work().taken() - before == Approx(0).margin(0.12 * scale));
+        const double ratio = step * step * stiffness / mass;
+        if (ratio < 0.9) CHECK(simulation.effect_work().taken() == 0);
+        if (ratio > 100 && step > 5e-4) CHECK(simulation.effect_work().taken() == Approx(scale).epsilon(0.05));  // it hangs
+      }
+    }
+  }
+}
+
+TEST_CASE("Two weights on an elastic cable over a hook, and a weight that swings into one, do not gain", "[cable]") {
+  for (const double stiffness : {1e4, 1e5, 1e6, 1e8}) {
+    for (const double step : {1e-3, 4e-3}) {
+      CAPTURE(stiffness, step);
+      const auto most_gain = [&](Simulation simulation, int steps) {
+        const double before = simulation.energy().total();
+        double most = before;
+        for (int k = 0; k < steps; ++k) {
+          REQUIRE(simulation.step().ok());
+          most = std::max(most, simulation.energy().total());
+        }
+        CHECK(simulation.passive_gifts().empty());
+        return most - before;
+      };
+      const Model lift = atwood();
+      Effects over_hook;
+      over_hook.dead_zone_springs.push_back({.row = length_row(lift), .stiffness = stiffness, .half_width = 3.6, .rest = 3.6});
+      CHECK(most_gain(Simulation(lift, {.step = step}, over_hook), static_cast<int>(1 / step)) < 1e-4 * kGravity);
+
+      const Model model = hanging();
+      Effects effects;
+      effects.dead_zone_springs.push_back({.row = length_row(model), .stiffness = stiffness, .half_width = 0.5, .rest = 0.5});
+      Simulation swings(model, {.step = step}, effects);
+      move(swings, 0.7, 0.6);
+      CHECK(most_gain(std::move(swings), static_cast<int>(10 / step)) < 0.01 * 2 * kGravity);
+    }
+  }
+}
+
+TEST_CASE("The damping of an elastic cable acts while it is stretched and never pushes", "[cable]") {
+  const Model model = hanging();
+  Effects effects;
+  effects.dead_zone_springs.push_back({.row = length_row(model), .stiffness = 2000, .half_width = 0.5, .rest = 0.5, .damping = 60});
+  Simulation simulation(model, {.step = 1e-3}, effects);
+  move(simulation, 0, 0.5);
+  const double before = simulation.energy().total();
+  REQUIRE(simulation.run(300).ok());
+  CHECK(length_of(simulation) < 1);
+  CHECK(moved(simulation, 2) == Approx(0.5 - 0.5 * kGravity * 0.09).margin(kCableMass));  // slack it falls freely
+  for (int k = 0; k < 5000; ++k) {
+    REQUIRE(simulation.step().ok());
+    REQUIRE(force_in(simulation) < 1e-4);  // it pulls, but for the acceleration of its own mass
+  }
+  CHECK(moved(simulation, 2) == Approx(-2 * kGravity / 2000).epsilon(1e-6));
+  CHECK(simulation.energy().total() + simulation.effect_work().of<DeadZoneSpring>() == Approx(before).margin(1e-3));
+}
+
 TEST_CASE("A winch lifts its weight by the motion of the cable's length", "[cable]") {
   const Model model = hanging();
   Effects effects;

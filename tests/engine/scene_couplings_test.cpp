@@ -112,6 +112,10 @@ TEST_CASE("a cable comes to its length and no farther, or stretches from there, 
   CHECK(longest < 5.2);
   CHECK(stretches.energy().total() == Approx(before).margin(1e4 * std::pow(1e-3 * 10, 2) / 8));  // what a step makes of an edge met at 10 m/s
 
+  CHECK(elastic.effects.dead_zone_springs[0].damping == 0);
+  CHECK(with(cable + ", length: 5, stiffness: 1e4, damping: 30}").effects.dead_zone_springs[0].damping == 30);
+  CHECK_THROWS_WITH(with(cable + ", length: 5, damping: 30}"), Catch::Contains("has a damping and no stiffness") && Catch::Contains("effects.damping"));
+
   const Scene moved = with(cable + ", length: 5}", "initial: {positions: {crank: 0.2}}");
   CHECK(at(Simulation(moved), "rope") == Approx(std::hypot(1 - std::sin(0.2), 3 - std::cos(0.2)) + std::hypot(2 - std::sin(0.2), 2 - std::cos(0.2))).epsilon(1e-14));
   CHECK(at(Simulation(moved), "crank") == 0.2);

@@ -86,8 +86,9 @@ class PlainForces {
       Q.segment<3>(body.v) += ball_spring_torque(spring, q.segment<4>(body.q));
     }
     for (const DeadZoneSpring& spring : effects_->dead_zone_springs) {
-      const double x = position(q, spring.row) - spring.rest;
-      Q[spring.row] -= spring.stiffness * (x - std::clamp(x, -spring.half_width, spring.half_width));
+      const double x = position(q, spring.row) - spring.rest, beyond = x - std::clamp(x, -spring.half_width, spring.half_width);
+      const double push = spring.stiffness * beyond + spring.damping * v[spring.row];
+      if (push * beyond > 0) Q[spring.row] -= push;
     }
     for (const JointDamping& damper : effects_->damping) Q[damper.row] -= damper.coefficient * v[damper.row];
     for (const Servo& servo : effects_->servos) {
@@ -121,7 +122,9 @@ class PlainForces {
       k.segment<3>(tree_->body(spring.slot).v).array() += spring.stiffness;
     }
     for (const DeadZoneSpring& spring : effects_->dead_zone_springs) {
-      if (std::abs(position(q, spring.row) - spring.rest) > spring.half_width) k[spring.row] += spring.stiffness;
+      if (std::abs(position(q, spring.row) - spring.rest) <= spring.half_width) continue;
+      k[spring.row] += spring.stiffness;
+      c[spring.row] += spring.damping;
     }
     for (const JointDamping& damper : effects_->damping) c[damper.row] += damper.coefficient;
     for (const Servo& servo : effects_->servos) {

@@ -97,7 +97,9 @@ class PlainScene {
     VectorXd c, k;
     fixed_->forces.joint_gains(q, c, k);
     for (const DeadZoneSpring& spring : fixed_->effects.dead_zone_springs) {
-      if (std::abs(fixed_->forces.position(q, spring.row) - spring.rest) <= spring.half_width) k[spring.row] += spring.stiffness;
+      if (std::abs(fixed_->forces.position(q, spring.row) - spring.rest) > spring.half_width) continue;
+      k[spring.row] += spring.stiffness;
+      c[spring.row] += spring.damping;
     }
     for (const Servo& servo : fixed_->effects.servos) {
       if (!std::isfinite(servo.max_force)) continue;
