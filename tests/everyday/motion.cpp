@@ -247,8 +247,9 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
       sum += 0.5 * std::pow(h * friction.force, 2) / inertia[friction.row];
     }
     for (const DeadZoneSpring& spring : scene.effects.dead_zone_springs) {
-      // of an edge that is crossed within a step
-      sum += spring.stiffness * std::pow(h * node.v[spring.row], 2) / 8;
+      // of an edge that is crossed within a step, no more than stops there
+      const double square = node.v[spring.row] * node.v[spring.row];
+      sum += std::min(spring.stiffness * h * h / 8, 0.5 * inertia[spring.row]) * square;
     }
     if (scene.effects.ground) {
       const double push = scene.effects.ground->stiffness;

@@ -373,7 +373,7 @@ class Maker {
     C.col(row).setZero();
     const double moved = (C * at.mass_matrix().ldlt().solve(C.transpose()))(0, 0);
     if (!(moved > 1e-9)) return;
-    const double w = std::min(log_uniform(0.01, scene_.stiff ? 4 : 0.3) / h_, scene_.stiff ? 1e4 : 500);
+    const double w = std::min(log_uniform(0.01, scene_.stiff ? 100 : 0.3) / h_, scene_.stiff ? 1e5 : 500);
     effects.dead_zone_springs.push_back({.row = row, .stiffness = w * w / moved, .half_width = most / 2, .rest = most / 2});
     scene_.bends = true;
   }
@@ -531,7 +531,7 @@ class Maker {
     Random random(scene_.seed * 15485863 + scene_.number);
     const auto log_uniform = [&](double low, double high) { return std::exp(random.uniform(std::log(low), std::log(high))); };
     each_screw([&](Index slot, Index row) {
-      const double w = std::min(log_uniform(0.005, scene_.stiff ? 4 : 0.3) / h_, scene_.stiff ? 1e4 : 500);
+      const double w = std::min(log_uniform(0.005, scene_.stiff ? 100 : 0.3) / h_, scene_.stiff ? 1e5 : 500);
       const double size = slides(slot) ? 0.1 : 0.8, beyond = std::min(size, (slides(slot) ? 1.0 : 5.0) / w);
       const double half_width = size * log_uniform(0.01, 1), away = random.uniform(-1, 1) * (half_width + beyond);
       const bool moved = std::ranges::any_of(scene_.effects.motions, [&](const JointMotion& motion) { return motion.row == row; });
