@@ -13,12 +13,13 @@
 //   point_on_line   d_x = d_y = 0                  x_B on the z axis of A       2
 //   point_on_plane  d_z = 0                        x_B in the xy plane of A     1
 //   rod             |x_B - x_A| = length                                        1
+//   bushing         springs along the axes of a frame half-way from A to B, and about roll, pitch and yaw of B in A: up to 6
 //   gear            sum of ratio q + offset = 0, of coordinates of screws       1
 //   cable           sum of |x_k+1 - x_k| = q, through points of two bodies      1
 //                   or more; q: of a joint of its own, which is its length
 //
 // Rows may give way: springs and dampers along their gaps instead of multipliers (kernels/couplings/compliance.hpp). A rod that does is a
-// spring between two points, a weld a bushing.
+// spring between two points. A bushing has nothing but such rows, those that have a stiffness or damping.
 #pragma once
 
 #include <array>
@@ -32,8 +33,8 @@
 
 namespace linden {
 
-enum class CouplingKind : std::uint8_t { ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear, cable };
-inline constexpr int kCouplingKinds = 11;
+enum class CouplingKind : std::uint8_t { ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear, cable, bushing };
+inline constexpr int kCouplingKinds = 12;
 
 /// What a row asks for.
 enum class GapKind : std::uint8_t {
@@ -41,6 +42,8 @@ enum class GapKind : std::uint8_t {
   product,  // cosine of the angle between axis a of A and axis b of B
   length,   // distance beyond the length; of a cable beyond its coordinate
   sum,      // of coordinates
+  halfway,  // d along axis a of A turned half-way to B, about the axis that turns it into B; after half a turn there are two such
+  angle,    // 0 roll, 1 pitch, 2 yaw of B in A: A^T B = R_z(yaw) R_y(pitch) R_x(roll); where the pitch is 90 degrees there are no two others
 };
 
 struct GapRow {
@@ -64,7 +67,10 @@ struct CablePoint {
 struct Compliance {
   double stiffness = 0, damping = 0;
   bool gives_way() const { return stiffness != 0 || damping != 0; }
+  friend bool operator==(const Compliance&, const Compliance&) = default;
 };
+/// Of rows along, or about, the three axes of A; of rows without an axis the first.
+using Compliances = std::array<Compliance, 3>;
 
 struct Coupling {
   std::string name;
@@ -75,18 +81,24 @@ struct Coupling {
   std::vector<GearTerm> terms{}; // of a gear; of a cable one, its length
   double offset = 0;             // of a gear
   std::vector<CablePoint> points{};  // of a cable, from end to end
-  Compliance shift{}, turn{};    // of rows in m [N/m, N s/m]; of those that are products, near zero an angle, and of gears [N m, N m s]
+  Compliances shift{}, turn{};   // of rows in m [N/m, N s/m]; of angles, products, which near zero are angles, and gears [N m, N m s]
 };
 
 /// Name of a kind in scenes and messages.
 const char* name_of(CouplingKind kind);
-/// Rows that a coupling of this kind is made of.
+/// Rows that a coupling of this kind can have.
 std::span<const GapRow> rows_of(CouplingKind kind);
+/// Rows that this one is made of: of a bushing those that give way, of all others all.
+std::span<const GapRow> rows_of(const Coupling& coupling);
 /// Of a row of this coupling.
 const Compliance& compliance_of(const Coupling& coupling, const GapRow& row);
 /// Whether some row of it does.
 bool gives_way(const Coupling& coupling);
-/// What it is: the name of its kind, of a rod that gives way a spring, of a weld that does a bushing, of others "soft hinge".
+/// Whether a row along or about any axis does.
+bool any_gives_way(const Compliances& compliances);
+/// Whether some row of it takes energy.
+bool damps(const Coupling& coupling);
+/// What it is: the name of its kind, of a rod that gives way a spring, of others "soft hinge".
 std::string kind_text(const Coupling& coupling);
 /// Rows of all of them; of these, those that do not give way.
 Index row_count(std::span<const Coupling> couplings);

@@ -50,10 +50,12 @@ std::uint64_t Model::hash() const {
     }
     hash.add_number(coupling.length);
     hash.add_number(coupling.offset);
-    for (const Compliance* law : {&coupling.shift, &coupling.turn}) {
-      if (!law->gives_way()) continue;
-      hash.add_number(law->stiffness);
-      hash.add_number(law->damping);
+    for (const Compliances* laws : {&coupling.shift, &coupling.turn}) {
+      if (!any_gives_way(*laws)) continue;
+      for (const Compliance& law : *laws) {
+        hash.add_number(law.stiffness);
+        hash.add_number(law.damping);
+      }
     }
     for (const GearTerm& term : coupling.terms) {
       hash.add_number(term.v_row);

@@ -64,7 +64,7 @@ void check_order(int order, const Model& model, const Effects& effects) {
   if (order == 2) return;
   std::string refused = irreversible(effects);
   for (const Coupling& coupling : model.couplings) {
-    if (coupling.shift.damping == 0 && coupling.turn.damping == 0) continue;
+    if (!damps(coupling)) continue;
     refused += fmt::format("{}the damping of coupling {}", refused.empty() ? "" : ", ", quoted(coupling.name));
     break;
   }

@@ -198,7 +198,7 @@ void bind_coupling(nb::module_& m) {
       .def_ro("name", &CouplingState::name)
       .def_prop_ro(
           "gaps", [](const CouplingState& self) { return fixed_array(std::span<const double>(self.gaps)); },
-          "Where the bodies are now [rows; m, or cosine of an angle; of a gear as its coordinates]. Of what gives way, how far it is stretched.")
+          "Where the bodies are now [rows; m, or cosine of an angle; of a bushing rad; of a gear as its coordinates]. Of what gives way, how far it is stretched.")
       .def_prop_ro(
           "forces", [](const CouplingState& self) { return fixed_array(std::span<const double>(self.forces)); },
           "Over the step taken last [rows; N, N m]: of a shift along its axis of the first link, on the second.")

@@ -26,8 +26,8 @@ inline constexpr StopTest kLastOf<StopTest> = StopTest::absolute;
 
 namespace {
 
-constexpr std::string_view kModelLine = "linden model 2\n", kAnyModel = "linden model ";
-constexpr std::string_view kSceneLine = "linden scene 2\n", kAnyScene = "linden scene ";
+constexpr std::string_view kModelLine = "linden model 3\n", kAnyModel = "linden model ";
+constexpr std::string_view kSceneLine = "linden scene 3\n", kAnyScene = "linden scene ";
 
 template <class T>
 std::string bytes_of(const T& value) {
@@ -132,6 +132,11 @@ class ModelCheck {
       check_place(coupling.frame_a);
       check_place(coupling.frame_b);
       require(std::isfinite(coupling.length) && std::isfinite(coupling.offset), "a coupling with a number that is not finite");
+      for (const Compliances* laws : {&coupling.shift, &coupling.turn}) {
+        const auto is_sound = [](const Compliance& law) { return law.stiffness >= 0 && law.damping >= 0 && std::isfinite(law.stiffness + law.damping); };
+        require(std::ranges::all_of(*laws, is_sound), "a spring or damper of a coupling that is below zero or not finite");
+      }
+      require(!rows_of(coupling).empty(), "a coupling that holds nothing");
       for (const GearTerm& term : coupling.terms) {
         bool is_screw = false;
         for (Index i = 1; i < tree_.shape.slots; ++i) {

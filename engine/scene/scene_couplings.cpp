@@ -18,6 +18,7 @@ const Keys kBodyKeys{"type",   "name",      "between", "point",             "axi
 const Keys kRodKeys{"type", "name", "between", "points", "length"};
 const Keys kSpringKeys{"type", "name", "between", "points", "stiffness", "damping", "rest"};
 const Keys kCableKeys{"type", "name", "between", "points", "joint", "length", "stiffness", "damping"};
+const Keys kBushingKeys{"type", "name", "between", "point", "frames", "stiffness", "damping", "turning_stiffness", "turning_damping"};
 const Keys kGearKeys{"type", "name", "joints", "offset", "turning_stiffness", "turning_damping"};
 const Keys kAllKeys{"type",   "name",   "between", "point",     "axis",    "second_axis", "frames",            "points",
                     "length", "joint", "joints", "offset",  "stiffness", "damping", "rest",        "turning_stiffness", "turning_damping"};
@@ -119,7 +120,7 @@ void read_bodies(const SceneValue& at, CouplingSpec& spec) {
   PointAndAxis where;
   where.point = vector_of(point->vector("[x, y, z] in m"));
   const auto axis = at.find("axis"), second = at.find("second_axis");
-  const bool turns = spec.kind != CouplingKind::ball && spec.kind != CouplingKind::weld;
+  const bool turns = spec.kind != CouplingKind::ball && spec.kind != CouplingKind::weld && spec.kind != CouplingKind::bushing;
   if (turns && !axis) at.fail(fmt::format("{} has no axis", at.path()), "axis: [x, y, z], in the world while all coordinates are zero", "add it");
   if (!turns && axis) axis->fail(fmt::format("a {} has no axis", name_of(spec.kind)), "none", "leave it out");
   if (axis) where.axis = vector_of(axis->vector("[x, y, z], of any length"));
@@ -128,24 +129,43 @@ void read_bodies(const SceneValue& at, CouplingSpec& spec) {
   spec.at = where;
 }
 
-Compliance read_compliance(const SceneValue& at, std::string_view stiffness, std::string_view damping) {
-  Compliance read;
-  if (const auto value = at.find(stiffness)) read.stiffness = value->not_negative("a stiffness, zero or more");
-  if (const auto value = at.find(damping)) read.damping = value->not_negative("a damping, zero or more");
-  return read;
+/// Of all axes alike, or of each, where there are such.
+Springs read_springs(const SceneValue& at, std::string_view stiffness, std::string_view damping, bool has_axes) {
+  const auto numbers_of = [&](std::string_view key, std::string_view what) -> std::array<double, 3> {
+    const auto value = at.find(key);
+    if (!value) return {0, 0, 0};
+    if (!has_axes || !value->is(SceneValue::Kind::list)) {
+      const double number = value->not_negative(fmt::format("a {}, zero or more{}", what, has_axes ? ", or three, [x, y, z]" : ""));
+      return {number, number, number};
+    }
+    const std::array<double, 3> numbers = value->vector(fmt::format("a {}, or three, [x, y, z], along or about the axes of the first link's frame", what));
+    if (std::ranges::min(numbers) < 0) value->refuse(fmt::format("three numbers, each a {}, zero or more", what), "correct them");
+    return numbers;
+  };
+  return {numbers_of(stiffness, "stiffness"), numbers_of(damping, "damping")};
 }
 
 CouplingSpec read_coupling(const SceneValue& at) {
   at.entries_of(kAllKeys);
   CouplingSpec spec;
-  const SceneValue type = required(at, "type", "type: hinge, ball, weld, rod, spring, gear or another one");
+  const SceneValue type = required(at, "type", "type: hinge, ball, weld, rod, spring, bushing, gear or another one");
   spec.kind = kind_of(type);
   const bool spring = type.choice(kTypeNames) == kSpring;
-  at.entries_of(spec.kind == CouplingKind::gear ? kGearKeys : spec.kind == CouplingKind::cable ? kCableKeys : spring ? kSpringKeys : spec.kind == CouplingKind::rod ? kRodKeys : kBodyKeys);
-  if (spec.kind != CouplingKind::cable) spec.shift = read_compliance(at, "stiffness", "damping");
-  spec.turn = read_compliance(at, "turning_stiffness", "turning_damping");
+  at.entries_of(spec.kind == CouplingKind::gear      ? kGearKeys
+                : spec.kind == CouplingKind::cable   ? kCableKeys
+                : spec.kind == CouplingKind::bushing ? kBushingKeys
+                : spring                             ? kSpringKeys
+                : spec.kind == CouplingKind::rod     ? kRodKeys
+                                                     : kBodyKeys);
+  const bool has_axes = spec.kind != CouplingKind::gear && spec.kind != CouplingKind::rod;
+  if (spec.kind != CouplingKind::cable) spec.shift = read_springs(at, "stiffness", "damping", has_axes);
+  spec.turn = read_springs(at, "turning_stiffness", "turning_damping", has_axes);
   if (spring && !spec.shift.gives_way()) {
     at.fail(fmt::format("{} neither pulls nor damps", at.path()), "stiffness: in N/m, damping: in N s/m, or both; a rod is rigid", "add one");
+  }
+  if (spec.kind == CouplingKind::bushing && !spec.shift.gives_way() && !spec.turn.gives_way()) {
+    at.fail(fmt::format("{} neither pulls nor damps", at.path()),
+            "stiffness, damping, turning_stiffness or turning_damping, a number or [x, y, z]; a weld is rigid", "add one");
   }
   if (const auto name = at.find("name")) spec.name = name->text("a name");
   if (const auto joint = at.find("joint")) spec.joint = ClosingJoint{.name = joint->text("a name for the coordinate of this joint")};

@@ -263,11 +263,11 @@ CouplingPaths::CouplingPaths(const Model& model, Closing closing, std::size_t si
   for (const Coupling& coupling : model.couplings) {
     CouplingPath& path = paths_.emplace_back(PathMaker(model, coupling, at_world).make());
     path.first_row = row;
-    path.last_row = row += rows_of(coupling.kind).size();
+    path.last_row = row += rows_of(coupling).size();
     path.room = (path.rows() + side_by_side - 1) / side_by_side * side_by_side;
     path.first_velocity = velocities_;
     velocities_ += path.room * path.velocities;
-    for (const GapRow& kind : rows_of(coupling.kind)) rigid_.push_back(compliance_of(coupling, kind).gives_way() ? 0 : 1);
+    for (const GapRow& kind : rows_of(coupling)) rigid_.push_back(compliance_of(coupling, kind).gives_way() ? 0 : 1);
     for (const CouplingPath::Joint& joint : path.joints) reach(joint.slot);
   }
   if (!model.couplings.empty()) {

@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -38,12 +39,15 @@ class CouplingRows {
     pose_.allocate(static_cast<Index>(longest));
     pull_.allocate(static_cast<Index>(longest));
     for (std::vector<S>* each : {&gap_, &size_, &scale_}) each->assign(count(), S(0.0));
+    steepness_.assign(count(), S(1.0));
     for (std::vector<S>* each : {&begin_, &end_}) each->assign(paths_.velocities(), S(0.0));
     for (const CouplingPath& path : paths_.all()) {
       for (const auto& term : path.coupling->terms) at_start_.push_back(as<S>(term.ratio));
       for (std::size_t row = 0; row < path.rows(); ++row) {
-        const GapKind kind = rows_of(path.coupling->kind)[row].kind;
-        size_[path.first_row + row] = as<S>(kind == GapKind::product || kind == GapKind::sum ? 1.0 : path.length);
+        const GapKind kind = rows_of(*path.coupling)[row].kind;
+        const bool shifts = kind == GapKind::shift || kind == GapKind::halfway || kind == GapKind::length;
+        size_[path.first_row + row] = as<S>(shifts ? path.length : 1.0);
+        if (kind == GapKind::angle) angles_.push_back({path.first_row + row, S(0.0)});
       }
     }
   }
@@ -59,6 +63,7 @@ class CouplingRows {
       for (const GearTerm& of : path.coupling->terms) at_start_[term++] = q(of.q_row);
     }
     look([&](auto, Index slot) { return load<Placement, S>(placement, slot); }, [](Index) { return S(0.0); }, &begin_, !keeps_scales_);
+    for (Angle& angle : angles_) angle.begin = gap_[angle.row];
   }
   /// Rows keep the scales of where they were placed last, so that gaps at several places can be compared.
   void keep_scales(bool keep) { keeps_scales_ = keep; }
@@ -67,12 +72,15 @@ class CouplingRows {
   void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta, Asked asked) {
     look([&](auto joint, Index slot) { return after_motion(joint, load<Placement, S>(placement, slot), load_motion(joint, motion, slot)); },
          [&](Index row) { return delta(row); }, asked == Asked::rows ? &end_ : nullptr, false);
+    for (const Angle& angle : angles_) gap_[angle.row] = near(gap_[angle.row], angle.begin);
   }
 
   /// Of each row [m], or without a unit; by what it is judged; 1 / root of how far it would move were its bodies free.
   const std::vector<S>& gaps() const { return gap_; }
   const std::vector<S>& sizes() const { return size_; }
   const std::vector<S>& scales() const { return scale_; }
+  /// Square of how fast an angle changes by a turn along its gradient: beyond 1 where a pitch leaves roll and yaw little room. 1 of other rows.
+  const std::vector<S>& steepness() const { return steepness_; }
   /// G at q^k, J at q^k+1: what every velocity of a path does to each of its rows.
   const std::vector<S>& at_begin() const { return begin_; }
   const std::vector<S>& at_end() const { return end_; }
@@ -128,6 +136,12 @@ class CouplingRows {
   template <class Number>
   static constexpr double kNoDistance = is_single<Number> ? 1e-18 : 1e-150;
 
+  /// Of all angles that are equal but for whole turns, that which is nearest to another.
+  static S near(const S& angle, const S& to) {
+    using std::floor;
+    constexpr double kTurn = 2 * std::numbers::pi;
+    return angle - as<S>(kTurn) * floor((angle - to) / as<S>(kTurn) + S(0.5));
+  }
   static Placement<S> placement_of(const Pose& pose) {
     double numbers[12];
     std::ranges::copy(pose.rotation, numbers);
@@ -170,7 +184,7 @@ class CouplingRows {
         continue;
       }
       const Placement<S> A = placed_in(pose(path.ends[0].at), placement_of(coupling.frame_a)), B = placed_in(pose(path.ends[1].at), placement_of(coupling.frame_b));
-      const std::span<const GapRow> kinds = rows_of(coupling.kind);
+      const std::span<const GapRow> kinds = rows_of(coupling);
       std::array<Gap<S>, 6> gaps;
       for (std::size_t j = 0; j < kinds.size(); ++j) {
         gaps[j] = gap_of(kinds[j], coupling.length, A, B);
@@ -192,6 +206,7 @@ class CouplingRows {
         S moves(0.0);
         for (const CouplingPath::End& end : path.ends) moves = moves + moved(end, gaps[j], B.p);
         scale_[path.first_row + j] = S(1.0) / sqrt(moves);
+        if (kinds[j].kind == GapKind::angle) steepness_[path.first_row + j] = dot(gaps[j].couple, gaps[j].couple);
       }
     }
   }
@@ -264,7 +279,12 @@ class CouplingRows {
   std::vector<S> at_start_;      // coordinates of gears and cables at q^k
   Field<S, 6> pull_;             // scratch: of a cable, what reaches each joint of its path from beyond
   std::vector<Gap<S>> ends_;     // likewise, what each of its bodies feels
-  std::vector<S> gap_, size_, scale_;
+  std::vector<S> gap_, size_, scale_, steepness_;
+  struct Angle {
+    std::size_t row;
+    S begin;  // at q^k
+  };
+  std::vector<Angle> angles_;    // a step may lead past half a turn, where they begin anew
   bool keeps_scales_ = false;
 };
 

@@ -72,7 +72,7 @@ class CouplingSweeps {
     if (!empty()) unpushed_.allocate(model.tree.shape.velocities);
     for (const CouplingPath& path : all()) {
       for (std::size_t row = 0; row < path.rows(); ++row) {
-        const Compliance& compliance = compliance_of(*path.coupling, rows_of(path.coupling->kind)[row]);
+        const Compliance& compliance = compliance_of(*path.coupling, rows_of(*path.coupling)[row]);
         if (compliance.gives_way()) springs_.add(path.first_row + row, compliance, yields.empty() ? 0 : yields[path.first_row + row]);
       }
     }
@@ -325,6 +325,8 @@ class CouplingSweeps {
     visit(std::span(factored_));
     visit(history_.flat());
   }
+  /// The same where an angle changes as fast as its bodies turn.
+  S level_yield(std::size_t row) const { return yield(row) / rows_.steepness()[row]; }
   const Coupling& coupling_of(std::size_t row) const { return *rows_.paths().path_of(row).coupling; }
 
  private:

@@ -118,7 +118,7 @@ std::vector<double> row_yields(const Model& model, std::span<const Armature> rot
   std::vector<double> yields(couplings.rows(), 0.0);
   configurations.visit([&] {
     for (std::size_t row = 0; row < yields.size(); ++row) {
-      const double yield = couplings.yield(row);
+      const double yield = couplings.level_yield(row);
       if (std::isfinite(yield)) yields[row] = std::max(yields[row], yield);
     }
   });

@@ -45,7 +45,7 @@ void TreeSweeps<kEffects>::each_cable(const Visit& visit) const {
       }
       if (!is_given) visit(row, length);
     }
-    row += rows_of(coupling.kind).size();
+    row += rows_of(coupling).size();
   }
 }
 

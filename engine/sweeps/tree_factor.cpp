@@ -199,7 +199,7 @@ std::vector<CouplingState> TreeSweeps<kEffects>::couplings(double h) const {
   for (std::size_t row = 0; const Coupling& coupling : model_.couplings) {
     CouplingState& state = states.emplace_back();
     state.name = coupling.name;
-    for (const std::size_t end = row + rows_of(coupling.kind).size(); row < end; ++row) {
+    for (const std::size_t end = row + rows_of(coupling).size(); row < end; ++row) {
       state.gaps.push_back(couplings_.gap(row));
       state.forces.push_back(h != 0 ? couplings_.multiplier(row) / (h * h) : 0);
       state.redundant.push_back(couplings_.is_held_already(row));

@@ -8,12 +8,19 @@
 //   shift     n = axis of A      gap n.(x_B - x_A)              force n
 //   product   a of A, b of B     gap a.b                        couple b x a
 //   length    n = d / |d|        gap |d| - length               force n
+//   halfway   b = H a            gap b.(x_B - x_A)              force b, couple (m + t x m) / 2,   m = b x (x_B - x_A)
+//   angle     R = A^T B          roll atan2(R_zy, R_zz)         couple (R_xx a_x + R_yx a_y) / (R_xx^2 + R_yx^2)
+//                                pitch atan2(-R_zx, c)          couple (R_xx a_y - R_yx a_x) / c,   c^2 = R_xx^2 + R_yx^2
+//                                yaw atan2(R_yx, R_xx)          couple a_z - R_zx (that of roll)
+//
+// H turns by half the angle theta from A to B about their common axis l, and t = tan(theta/4) l: where B turns against A by w, H does by
+// (w - t x w) / 2. Without t x m what pushes is a force at the point half-way between x_A and x_B, as Drake's bushing does.
 //
 //   joint i on the way to b:  S_i^T Ad_{T_i}^T (couple + (x_B - o_i) x force, force);  on the way to a: minus that
 //
 // At q^k this is G, whose transpose a multiplier pushes along; at q^k+1 it is J, by which a correction of the displacement changes the gap.
 //
-// source  contact-free rows of Featherstone, Rigid Body Dynamics Algorithms, 8.1 to 8.3 (loop constraints)
+// source  contact-free rows of Featherstone, Rigid Body Dynamics Algorithms, 8.1 to 8.3 (loop constraints); Drake, LinearBushingRollPitchYaw
 #pragma once
 
 #include <cmath>
@@ -36,6 +43,40 @@ LINDEN_INLINE Vec3<S> axis_of(const Mat3<S>& R, int axis) {
   return {of(R.x), of(R.y), of(R.z)};
 }
 
+/// Of an angle.
+template <class S>
+Gap<S> gap_of_angle(int angle, const Mat3<S>& A, const Mat3<S>& B) {
+  using std::atan2, std::max, std::sqrt;
+  constexpr double kUpright = 1e-12;  // square of the cosine of a pitch that has no roll
+  const Vec3<S> none{S(0.0), S(0.0), S(0.0)}, a_x = axis_of(A, 0), a_y = axis_of(A, 1), a_z = axis_of(A, 2), x = axis_of(B, 0);
+  const S xx = dot(a_x, x), yx = dot(a_y, x), zx = dot(a_z, x), square = max(xx * xx + yx * yx, as<S>(kUpright));
+  if (angle == 1) {
+    const S level = sqrt(square);
+    return {atan2(S(0.0) - zx, level), none, (xx * a_y - yx * a_x) / level};
+  }
+  const Vec3<S> rolls = (xx * a_x + yx * a_y) / square;
+  if (angle == 0) return {atan2(dot(a_z, axis_of(B, 1)), dot(a_z, axis_of(B, 2))), none, rolls};
+  return {atan2(yx, xx), none, a_z - zx * rolls};
+}
+
+/// Of a shift along an axis of the frame half-way; d: from x_A to x_B.
+template <class S>
+Gap<S> gap_halfway(int axis, const Vec3<S>& d, const Mat3<S>& A, const Mat3<S>& B) {
+  using std::max, std::sqrt;
+  constexpr double kHalfTurn = 1e-12;  // 1 + trace, of a turn that has two frames half-way
+  S sum(1.0);
+  Vec3<S> sine{S(0.0), S(0.0), S(0.0)};  // 2 sin(theta) l
+  for (const int k : {0, 1, 2}) {
+    const Vec3<S> a = axis_of(A, k), b = axis_of(B, k);
+    sum = sum + dot(a, b);
+    sine = sine + cross(a, b);
+  }
+  const S w = S(0.5) * sqrt(max(sum, as<S>(kHalfTurn)));  // cos(theta/2)
+  const Vec3<S> u = sine / (S(4.0) * w), t = u / (S(1.0) + w);  // sin(theta/2) l, tan(theta/4) l
+  const Vec3<S> a = axis_of(A, axis), turned = cross(u, a), b = a + turned + cross(t, turned), m = cross(b, d);
+  return {dot(b, d), b, S(0.5) * (m + cross(t, m))};
+}
+
 /// Of any row but a sum.
 template <class S>
 Gap<S> gap_of(const GapRow& row, double length, const Placement<S>& A, const Placement<S>& B) {
@@ -49,6 +90,8 @@ Gap<S> gap_of(const GapRow& row, double length, const Placement<S>& A, const Pla
     const Vec3<S> a = axis_of(A.R, row.a), b = axis_of(B.R, row.b);
     return {dot(a, b), none, cross(b, a)};
   }
+  if (row.kind == GapKind::angle) return gap_of_angle(row.a, A.R, B.R);
+  if (row.kind == GapKind::halfway) return gap_halfway(row.a, d, A.R, B.R);
   const S distance = sqrt(dot(d, d));
   return {distance - as<S>(length), d / distance, none};
 }

@@ -55,8 +55,8 @@ class Coupler {
     if (spec.joint) check_joint(spec);
     Coupling coupling;
     coupling.kind = spec.kind;
-    coupling.shift = spec.shift;
-    coupling.turn = spec.turn;
+    coupling.shift = spec.shift.along;
+    coupling.turn = spec.turn.along;
     coupling.name = spec.name.empty() ? default_name(spec, coupling) : spec.name;
     if (!names_.insert(coupling.name).second) refuse_coupling(coupling.name, "there is another one of this name; expected each once; give it a name");
     check_compliance(coupling);
@@ -93,18 +93,30 @@ class Coupler {
     }
   }
   static void check_compliance(const Coupling& coupling) {
-    for (const Compliance* law : {&coupling.shift, &coupling.turn}) {
-      for (const double number : {law->stiffness, law->damping}) {
-        if (!(number >= 0) || !std::isfinite(number)) {
-          refuse_coupling(coupling.name, fmt::format("a stiffness or damping of it is {}; expected a finite number, zero or more", number));
+    for (const Compliances* laws : {&coupling.shift, &coupling.turn}) {
+      const char* const does = laws == &coupling.turn ? "turns" : "shifts";
+      const bool is_one = (*laws)[0] == (*laws)[1] && (*laws)[0] == (*laws)[2];
+      bool used = false;
+      for (std::size_t axis = 0; axis < laws->size(); ++axis) {
+        const Compliance& law = (*laws)[axis];
+        for (const double number : {law.stiffness, law.damping}) {
+          if (!(number >= 0) || !std::isfinite(number)) {
+            refuse_coupling(coupling.name, fmt::format("a stiffness or damping of it is {}; expected a finite number, zero or more", number));
+          }
+        }
+        const auto uses = [&](const GapRow& row) { return &compliance_of(coupling, row) == &law; };
+        const bool has_row = std::ranges::any_of(rows_of(coupling.kind), uses);
+        used = used || has_row;
+        if (!is_one && !has_row && law.gives_way()) {
+          refuse_coupling(coupling.name,
+                          fmt::format("a {} has nothing that {} along its axis {}; expected zero there", name_of(coupling.kind), does, "xyz"[axis]));
         }
       }
-      const auto uses = [&](const GapRow& row) { return &compliance_of(coupling, row) == law; };
-      if (law->gives_way() && std::ranges::none_of(rows_of(coupling.kind), uses)) {
-        refuse_coupling(coupling.name, fmt::format("a {} has nothing that {}; expected no stiffness or damping of that", name_of(coupling.kind),
-                                                   law == &coupling.turn ? "turns" : "shifts"));
+      if (any_gives_way(*laws) && !used) {
+        refuse_coupling(coupling.name, fmt::format("a {} has nothing that {}; expected no stiffness or damping of that", name_of(coupling.kind), does));
       }
     }
+    if (rows_of(coupling).empty()) refuse_coupling(coupling.name, "it neither pulls nor damps; expected a stiffness or damping above zero");
   }
   LinkPlace place_of(const std::string& coupling, const std::string& link) const {
     if (link.empty() || link == "world") return {};
@@ -132,7 +144,9 @@ class Coupler {
       const PointAndAxis& at = *spec.at;
       if (!at.point.allFinite() || !at.axis.allFinite() || !at.second_axis.allFinite()) refuse_coupling(coupling.name, "its point or axis is not finite");
       if (at.axis.norm() < 1e-12) refuse_coupling(coupling.name, "its axis has no length; expected a direction");
-      Isometry in_world_a = frame_at(at.point, at.axis, at.second_axis), in_world_b = in_world_a;
+      Eigen::Vector3d side = at.second_axis;
+      if (spec.kind == CouplingKind::bushing && side.isZero()) side = Eigen::Vector3d::UnitY();
+      Isometry in_world_a = frame_at(at.point, at.axis, side), in_world_b = in_world_a;
       if (spec.kind == CouplingKind::universal) {
         const Eigen::Vector3d second = at.second_axis.isZero() ? in_world_a.linear().col(1) : at.second_axis;
         if (std::abs(at.axis.normalized().dot(second.normalized())) > 1e-9) refuse_coupling(coupling.name, "its two axes are not at right angles");
@@ -154,7 +168,7 @@ class Coupler {
   }
 
   void add_cable(const CouplingSpec& spec, Coupling& coupling) {
-    if (coupling.shift.gives_way()) refuse_coupling(coupling.name, "a cable stretches by a spring on its length; expected no stiffness or damping of its row");
+    if (any_gives_way(coupling.shift)) refuse_coupling(coupling.name, "a cable stretches by a spring on its length; expected no stiffness or damping of its row");
     for (const CablePlace& place : spec.through) place_of(coupling.name, place.link);
     const ClosingJoint length = spec.joint.value_or(ClosingJoint{.name = coupling.name});
     if (!spec.joint) check_name(coupling.name, length.name);

@@ -5,7 +5,8 @@
 //                                                 .at = PointAndAxis{{1, 0, 0}, {0, 1, 0}}}});
 //
 // Where both frames are not given they come from one point and one axis in the world while all coordinates are zero: that is how a mechanism
-// is drawn. z of both frames is the axis; of a universal joint x of A is the axis and y of B the second one.
+// is drawn. z of both frames is the axis; of a universal joint x of A is the axis and y of B the second one; those of a bushing without an
+// axis are parallel to the world's.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +25,18 @@ namespace linden {
 struct PointAndAxis {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();        // [m]
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d second_axis = Eigen::Vector3d::Zero();  // of a universal joint
+  Eigen::Vector3d second_axis = Eigen::Vector3d::Zero();  // of a universal joint; of others, where it is not zero, y of both frames is nearest to it
+};
+
+/// Springs and dampers in the place of rows, along or about the three axes of the first frame: one number for all of them, or three.
+struct Springs {
+  Compliances along{};
+
+  Springs() = default;
+  Springs(double stiffness, double damping) : along{Compliance{stiffness, damping}, {stiffness, damping}, {stiffness, damping}} {}
+  Springs(const std::array<double, 3>& stiffness, const std::array<double, 3>& damping)
+      : along{Compliance{stiffness[0], damping[0]}, {stiffness[1], damping[1]}, {stiffness[2], damping[2]}} {}
+  bool gives_way() const { return any_gives_way(along); }
 };
 
 /// Ratio of a screw joint's coordinate in a gear.
@@ -43,13 +55,13 @@ struct CouplingSpec {
   std::vector<GearJoint> joints{};       // of a gear: sum of ratio q + offset = 0
   double offset = 0;
   std::vector<CablePlace> through{};     // points of a cable, from end to end
-  Compliance shift{}, turn{};            // springs and dampers in the place of rows (layout/couplings.hpp); none: they are rigid
+  Springs shift{}, turn{};               // of rows in m, and of those of directions, angles and gears; without, rows are rigid, of a bushing free
   std::optional<ClosingJoint> joint{};   // of a hinge or slider: it gets a coordinate; of a cable its length, called as the cable where it is not given
 };
 
 /// The model with these couplings beside those that it has. Throws InputError for a link or joint that there is not, a coupling of a body with
-/// itself or of the world with itself, an axis of no length, two couplings of one name, a gear of joints that do not slide or turn, and what
-/// with_closing_joint and with_cable_length do.
+/// itself or of the world with itself, an axis of no length, two couplings of one name, a gear of joints that do not slide or turn, a bushing
+/// without a spring or damper, springs where nothing can give way, and what with_closing_joint and with_cable_length do.
 Model coupled(Model model, const std::vector<CouplingSpec>& couplings);
 
 /// Poses of all bodies in the world while all coordinates are zero, by slot; joints that follow others are where they follow them to.

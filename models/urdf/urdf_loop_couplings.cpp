@@ -41,7 +41,8 @@ CouplingSpec coupling_of(const UrdfLoop& loop, const Model& model, const std::ve
   spec.frame_a.linear() *= turn;
   spec.frame_b.linear() *= turn;
   spec.length = loop.length;
-  spec.shift = loop.spring;
+  spec.shift = loop.shift;
+  spec.turn = loop.turn;
   return spec;
 }
 

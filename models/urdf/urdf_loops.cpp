@@ -9,6 +9,7 @@
 #include <numbers>
 #include <string_view>
 #include <set>
+#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
@@ -60,9 +61,20 @@ const char* text_within(const XMLElement& element) {
   return text ? text : "";
 }
 
+constexpr const char *kBushing = "drake:linear_bushing_rpy", *kBushingA = "drake:bushing_frameA", *kBushingC = "drake:bushing_frameC";
+
+/// Each <frame> of a robot by its name; of several with one name the first.
+std::unordered_map<std::string_view, const XMLElement*> frames_of(const XMLElement& robot) {
+  std::unordered_map<std::string_view, const XMLElement*> frames;
+  for (const XMLElement* frame = robot.FirstChildElement("frame"); frame; frame = frame->NextSiblingElement("frame")) {
+    if (const char* name = frame->Attribute("name")) frames.try_emplace(name, frame);
+  }
+  return frames;
+}
+
 class LoopReader {
  public:
-  LoopReader(const UrdfStructure& robot, UrdfReport& report) : robot_(robot), report_(report) {
+  LoopReader(const UrdfStructure& robot, UrdfReport& report) : robot_(robot), report_(report), frames_(frames_of(robot.robot())) {
     for (const UrdfLink& link : robot.links()) links_.insert(link.name);
   }
 
@@ -75,6 +87,8 @@ class LoopReader {
         take(*element, [&](UrdfLoop& loop) { read_ball_constraint(*element, loop); });
       } else if (name == "drake:linear_spring_damper") {
         take(*element, [&](UrdfLoop& loop) { read_spring_damper(*element, loop); });
+      } else if (name == kBushing) {
+        take(*element, [&](UrdfLoop& loop) { read_bushing(*element, loop); });
       } else if (name == "gazebo") {
         for (const XMLElement* joint = element->FirstChildElement("joint"); joint; joint = joint->NextSiblingElement("joint")) {
           take(*joint, [&](UrdfLoop& loop) { read_sdf(*joint, loop); });
@@ -113,7 +127,7 @@ class LoopReader {
   void give_name(UrdfLoop& loop) {
     const auto link = [](const std::string& name) { return name.empty() ? std::string("world") : name; };
     const bool named = !loop.name.empty();
-    const char* const kind = loop.spring.gives_way() ? "spring" : name_of(loop.kind);
+    const char* const kind = loop.kind == CouplingKind::rod ? "spring" : name_of(loop.kind);
     if (!named) loop.name = fmt::format("{} of {} and {}", kind, link(loop.link_a), link(loop.link_b));
     const std::string wanted = loop.name;
     for (int number = 2; !names_.insert(loop.name).second; ++number) loop.name = fmt::format("{}_{}", wanted, number);
@@ -348,9 +362,44 @@ class LoopReader {
       return value;
     };
     loop.length = number(kLength);
-    loop.spring.stiffness = number(kStiffness);
-    loop.spring.damping = number(kDamping);
-    if (!loop.spring.gives_way()) fail(element, loop, "it neither pulls nor damps", "a stiffness or damping above zero", "give one");
+    loop.shift = {number(kStiffness), number(kDamping)};
+    if (!loop.shift.gives_way()) fail(element, loop, "it neither pulls nor damps", "a stiffness or damping above zero", "give one");
+  }
+
+  void read_bushing(const XMLElement& element, UrdfLoop& loop) const {
+    constexpr const char *kTurns = "drake:bushing_torque_stiffness", *kTurnsSlowly = "drake:bushing_torque_damping",
+                         *kShifts = "drake:bushing_force_stiffness", *kShiftsSlowly = "drake:bushing_force_damping";
+    loop.kind = CouplingKind::bushing;
+    look_at(element, loop, {}, {kBushingA, kBushingC, kTurns, kTurnsSlowly, kShifts, kShiftsSlowly});
+    read_frame(part(element, loop, kBushingA), loop, loop.link_a, loop.in_a);
+    read_frame(part(element, loop, kBushingC), loop, loop.link_b, loop.in_b);
+    const auto numbers = [&](const char* name) {
+      const XMLElement* const says = element.FirstChildElement(name);
+      if (!says) return std::array<double, 3>{};
+      look_at(*says, loop, {"value"}, {});
+      const std::array<double, 3> three = numbers_.three(loop.owner, *says, "value");
+      if (std::ranges::min(three) < 0) fail(*says, loop, fmt::format("<{}> has a number below zero", name), "three numbers, zero or more", "correct it");
+      return three;
+    };
+    loop.turn = {numbers(kTurns), numbers(kTurnsSlowly)};
+    loop.shift = {numbers(kShifts), numbers(kShiftsSlowly)};
+    if (!loop.shift.gives_way() && !loop.turn.gives_way()) {
+      fail(element, loop, "it neither pulls nor damps", "a stiffness or damping above zero", "give one");
+    }
+  }
+  /// A <frame> of the robot, or a link, that an element of Drake names.
+  void read_frame(const XMLElement& names, const UrdfLoop& loop, std::string& link, Isometry& pose) const {
+    look_at(names, loop, {"name"}, {});
+    const char* const name = names.Attribute("name");
+    const auto found = frames_.find(name ? name : "");
+    if (found == frames_.end()) {
+      link = link_of(names, loop, name);
+      return;
+    }
+    const XMLElement& frame = *found->second;
+    look_at(frame, loop, {"name", "link", "xyz", "rpy"}, {});
+    link = link_of(frame, loop, frame.Attribute("link"));
+    pose = frame_in(frame, loop).value_or(Isometry::Identity());
   }
 
   /// The numbers that an element of SDFormat holds as its text.
@@ -469,6 +518,7 @@ class LoopReader {
   const UrdfStructure& robot_;
   UrdfReport& report_;
   UrdfNumbers numbers_{report_};
+  std::unordered_map<std::string_view, const XMLElement*> frames_;
   std::set<std::string> links_;
   mutable int compared_ = 0;  // wrong links with all that there are
   std::unordered_set<std::string> names_;
@@ -478,6 +528,19 @@ class LoopReader {
 }  // namespace
 
 std::vector<UrdfLoop> loops_of(const UrdfStructure& robot, UrdfReport& report) { return LoopReader(robot, report).run(); }
+
+std::unordered_set<const XMLElement*> frames_of_bushings(const XMLElement& robot) {
+  const std::unordered_map<std::string_view, const XMLElement*> frames = frames_of(robot);
+  std::unordered_set<const XMLElement*> held;
+  for (const XMLElement* bushing = robot.FirstChildElement(kBushing); bushing; bushing = bushing->NextSiblingElement(kBushing)) {
+    for (const char* const end : {kBushingA, kBushingC}) {
+      const XMLElement* const names = bushing->FirstChildElement(end);
+      const char* const name = names ? names->Attribute("name") : nullptr;
+      if (const auto found = frames.find(name ? name : ""); found != frames.end()) held.insert(found->second);
+    }
+  }
+  return held;
+}
 
 bool holds_joints_only(const XMLElement& gazebo) {
   if (std::string_view(gazebo.Name()) != "gazebo" || !gazebo.FirstChildElement("joint")) return false;

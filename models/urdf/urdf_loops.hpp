@@ -15,6 +15,11 @@
 //     <drake:ball_constraint_body_A name/>, _body_B; <drake:ball_constraint_p_AP value="x y z"/>, _p_BQ
 //   <drake:linear_spring_damper>                    Drake, a spring and damper between two points; likewise, and
 //     <drake:linear_spring_damper_free_length value/>, _stiffness, _damping
+//   <drake:linear_bushing_rpy>                      Drake, LinearBushingRollPitchYaw, a bushing between two frames (kernels/couplings/gap_map.hpp)
+//     <drake:bushing_frameA name/>, _frameC           each a <frame name link xyz rpy> of the robot, or a link
+//     <drake:bushing_torque_stiffness value="x y z"/>, _torque_damping, _force_stiffness, _force_damping    what is 0 0 0 may be left out
+//   Drake's forces, and where _force_ numbers are alike its torques, are those of the bushing here. Where they differ, its damper takes the frame
+//   half-way to turn by half of what the link does, which it does not after a turn by theta: torques are tan(theta/4)/2 |d x f| apart at most.
 //   <gazebo> <joint name type>                      Gazebo: a joint of SDFormat inside <gazebo>
 //     <parent>, <child>, <pose relative_to> in the child's frame where nothing else is said, <axis> <xyz expressed_in> <limit> <dynamics>, <axis2>;
 //     both ends meet where all coordinates are zero
@@ -29,6 +34,7 @@
 
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "models/build/coupled_model.hpp"
@@ -54,18 +60,22 @@ struct UrdfLoop {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX(), second_axis = Eigen::Vector3d::UnitY();  // of length 1; the second of a universal joint
   std::optional<std::string> axis_in{};         // a link in whose frame they are given, empty: the world; else in the joint's
   double length = 0;                            // of a spring [m]
-  Compliance spring{};
+  Springs shift{}, turn{};                      // of a spring and a bushing
   std::optional<ClosingJoint> joint{};          // with limits, damping or friction
 };
 
-/// False for a ball, a weld and a rod.
-inline bool has_axis(CouplingKind kind) { return kind != CouplingKind::ball && kind != CouplingKind::weld && kind != CouplingKind::rod; }
+/// False for a ball, a weld, a rod and a bushing.
+inline bool has_axis(CouplingKind kind) {
+  return kind != CouplingKind::ball && kind != CouplingKind::weld && kind != CouplingKind::rod && kind != CouplingKind::bushing;
+}
 
 /// All loops of the file that are understood, in its order; names that are there already are lengthened. What is not is a warning.
 std::vector<UrdfLoop> loops_of(const UrdfStructure& robot, UrdfReport& report);
 
 /// True for a <gazebo> that holds nothing but joints.
 bool holds_joints_only(const tinyxml2::XMLElement& gazebo);
+/// Each <frame> that a bushing of a robot names.
+std::unordered_set<const tinyxml2::XMLElement*> frames_of_bushings(const tinyxml2::XMLElement& robot);
 
 /// The model with these loops as couplings, but for those between two parts of one body, which are warnings.
 Model with_loops(Model model, const std::vector<UrdfLoop>& loops, const std::string& source_name);

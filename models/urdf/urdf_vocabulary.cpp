@@ -8,6 +8,7 @@
 #include <map>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -61,6 +62,7 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"loop",              "robot",                           loops,     many,       "",                            ""},
     {"drake:ball_constraint",    "robot",                    loops,     many,       "",                            ""},
     {"drake:linear_spring_damper", "robot",                  loops,     many,       "",                            ""},
+    {"drake:linear_bushing_rpy", "robot",                    loops,     many,       "",                            ""},
 
     {"coupling",          "robot",                           lost,      many,       "",                            ""},
     {"cable",             "robot",                           lost,      many,       "",                            ""},
@@ -68,7 +70,6 @@ constexpr auto kVocabulary = std::to_array<UrdfElement>({
     {"spring",            "robot joint",                     lost,      many,       "",                            ""},
     {"traits",            "joint",                           lost,      many,       "",                            ""},
     {"joint_properties",  "joint",                           lost,      many,       "",                            ""},
-    {"drake:linear_bushing_rpy", "robot",                    lost,      many,       "",                            ""},
     {"drake:tendon_constraint",  "robot",                    lost,      many,       "",                            ""},
     {"drake:mimic",       "joint",                           lost,      many,       "",                            ""},
     {"contact",           "link",                            lost,      many,       "",                            ""},
@@ -190,6 +191,7 @@ class Walk {
   explicit Walk(UrdfReport& report) : report_(report) {}
 
   void run(const XMLElement& robot) {
+    frames_of_bushings_ = frames_of_bushings(robot);
     look_at(robot, vocabulary_.robot(), nullptr);
     tell_findings();
     tell_others();
@@ -230,17 +232,13 @@ class Walk {
         tell_misplaced(*child, element, *child_row, owner);
       } else if (child_row->element->use == lost) {
         refuse_macros_within(*child);
-        const bool stands_for_a_joint = std::string_view(child->Name()) == "drake:linear_bushing_rpy";
-        const auto words = [&] {
-          return Words{fmt::format("known but not simulated: <{}>", shown(child->Name())),
-                       stands_for_a_joint ? fmt::format("{}; where it closes a loop, write a <drake:ball_constraint> or a <loop_joint>", kWithout) : kWithout};
-        };
+        const auto words = [&] { return Words{fmt::format("known but not simulated: <{}>", shown(child->Name())), kWithout}; };
         tell(*child, "lost", row, "", owner, words);
       } else if (child_row->element->use == loops) {
         refuse_macros_within(*child);
       } else if (child_row->element->use == others) {
         refuse_macros_within(*child);
-        if (row.element->name == "robot" && holds_joints_only(*child)) continue;
+        if (row.element->name == "robot" && (holds_joints_only(*child) || frames_of_bushings_.contains(child))) continue;
         const auto at = extensions_.try_emplace(shown(child->Name()), Extension{child->GetLineNum()}).first;
         at->second.count += 1;
       } else {
@@ -417,6 +415,7 @@ class Walk {
   std::vector<Finding> findings_;  // in the order of the file
   std::unordered_map<std::string, std::size_t> finding_of_;
   std::map<std::string, Extension> extensions_;
+  std::unordered_set<const XMLElement*> frames_of_bushings_;
 };
 
 }  // namespace

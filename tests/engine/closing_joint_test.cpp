@@ -173,7 +173,7 @@ TEST_CASE("a coordinate for what has none is refused") {
   ball.joint = ClosingJoint{.name = "k"};
   CHECK_THROWS_WITH(coupled(model, {ball}), Contains("a ball has no coordinate of its own; expected a hinge, a slider or a cable"));
   CouplingSpec soft{.name = "soft", .kind = CouplingKind::hinge, .link_a = "coupler", .link_b = "rocker", .at = PointAndAxis{{2, 0, 2}, {0, 1, 0}}};
-  soft.shift = {.stiffness = 100};
+  soft.shift = {100, 0};
   soft.joint = ClosingJoint{.name = "s"};
   CHECK_THROWS_WITH(coupled(model, {soft}), Contains("it gives way"));
   soft.shift = {};

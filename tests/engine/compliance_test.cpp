@@ -1,4 +1,4 @@
-// Couplings that give way: springs, dampers and bushings between bodies.
+// Couplings that give way: springs and dampers between bodies, soft joints.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -242,7 +242,7 @@ TEST_CASE("Two rotors on a soft shaft turn against each other at its frequency")
   CouplingSpec shaft;
   shaft.kind = CouplingKind::gear;
   shaft.joints = {{"a_joint", 1}, {"b_joint", -1}};
-  shaft.turn.stiffness = 30;
+  shaft.turn = {30, 0};
   Simulation simulation(coupled(builder.build(), {shaft}), weightless(1e-3));
   simulation.set_velocities(std::vector{1.0, 0.0});
   const double w = std::sqrt(30 * (1 / 0.1 + 1 / 0.3));
@@ -254,7 +254,7 @@ TEST_CASE("Two rotors on a soft shaft turn against each other at its frequency")
   }
 }
 
-TEST_CASE("A four-bar with a bushing for its pin moves nearly as one with a hinge, alone and in lanes") {
+TEST_CASE("A four-bar with a soft hinge for its pin moves nearly as one with a hinge, alone and in lanes") {
   const auto four = [](double stiffness) {
     TreeBuilder builder("four-bar");
     builder.add(bar("crank", "", {0, 0, 0}, {0, 0, 1}));

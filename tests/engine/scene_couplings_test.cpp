@@ -57,6 +57,9 @@ TEST_CASE("couplings that give way are read, hold no coordinate, and keep the ac
                           Case{"{type: spring, between: [world, rocker], points: [[2, 0, 1], [-1, 0, 2]], stiffness: 100, rest: 0}", 3, 3},
                           Case{"{type: hinge, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 1, 0], turning_stiffness: 1e3}", 5, 1},
                           Case{"{type: weld, between: [coupler, rocker], point: [2, 0, 2], stiffness: 1e5, turning_stiffness: 10, turning_damping: 1}", 6, 3},
+                          Case{"{type: weld, between: [coupler, rocker], point: [2, 0, 2], stiffness: [1e4, 0, 2e4], turning_stiffness: [10, 20, 30]}", 6, 3},
+                          Case{"{type: bushing, between: [coupler, rocker], point: [2, 0, 2], stiffness: 1e4, turning_damping: [0, 2, 0]}", 4, 3},
+                          Case{"{type: bushing, between: [coupler, rocker], frames: [{position: [2, 0, 1]}, {position: [-1, 0, 2], rotation: [0, 1, 0]}], turning_stiffness: [1, 9, 1]}", 3, 3},
                           Case{"{type: gear, joints: {crank: 2, rocker: -1}, turning_stiffness: 50, turning_damping: 2}", 1, 3});
   CAPTURE(c.text);
   run(c);
@@ -168,6 +171,10 @@ TEST_CASE("what a coupling cannot be is told with its line") {
   CHECK_THAT(message("{type: spring, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: -2}"), Catch::Contains("stiffness"));
   CHECK_THAT(message("{type: ball, between: [coupler, rocker], point: [2, 0, 2], turning_stiffness: 3}"), Catch::Contains("nothing that turns"));
   CHECK_THAT(message("{type: rod, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: 3}"), Catch::Contains("stiffness"));
+  CHECK_THAT(message("{type: spring, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]], stiffness: [1, 2, 3]}"), Catch::Contains("stiffness"));
+  CHECK_THAT(message("{type: bushing, between: [coupler, rocker], point: [2, 0, 2]}"), Catch::Contains("neither pulls nor damps"));
+  CHECK_THAT(message("{type: bushing, between: [coupler, rocker], point: [2, 0, 2], stiffness: [1, -2, 3]}"), Catch::Contains("each a stiffness, zero or more"));
+  CHECK_THAT(message("{type: bushing, between: [coupler, rocker], point: [2, 0, 2], axis: [0, 1, 0], damping: 1}"), Catch::Contains("axis"));
   CHECK_THAT(message("{type: cable, between: [coupler, rocker], points: [[0, 0, 0], [0, 0, 1]]}"), Catch::Contains("has no name"));
   CHECK_THAT(message("{type: cable, name: c, between: [coupler], points: [[0, 0, 0]]}"), Catch::Contains("write two links or more"));
   CHECK_THAT(message("{type: cable, name: c, between: [coupler, rocker], points: [[0, 0, 0]]}"), Catch::Contains("1 points and 2 links"));

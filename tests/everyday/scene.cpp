@@ -265,14 +265,15 @@ class Maker {
   /// One to three couplings that give way: springs between points, some damped, bushings, soft joints of all kinds; stretched at the start where
   /// they have a length. Numbers of its own, likewise.
   void make_springs() {
-    Random random(scene_.seed * 86028121 + scene_.number);
+    Random random(scene_.seed * 86028121 + scene_.number), uneven(scene_.seed * 15485863 + scene_.number);
     const auto log_uniform = [&](double low, double high) { return std::exp(random.uniform(std::log(low), std::log(high))); };
     const std::vector<Isometry> poses = poses_at_start();
     const Index bodies = model().tree.bodies();
     const auto is_link = [&](Index slot) { return slot == 0 || model().names.link.contains(model().names.body[static_cast<std::size_t>(slot)]); };
     std::vector<CouplingSpec> specs;
     for (int tries = 0; tries < 6 && specs.size() < 1 + scene_.number % 3; ++tries) {
-      const CouplingKind kind = random.uniform(0, 1) < 0.5 ? CouplingKind::rod : static_cast<CouplingKind>(random.below(kDrawnKinds - 1));
+      const CouplingKind drawn = random.uniform(0, 1) < 0.5 ? CouplingKind::rod : static_cast<CouplingKind>(random.below(kDrawnKinds - 1));
+      const CouplingKind kind = drawn == CouplingKind::weld && uneven.uniform(0, 1) < 0.7 ? CouplingKind::bushing : drawn;
       const auto a = static_cast<Index>(random.below(static_cast<std::uint64_t>(bodies) + 1));
       const auto b = static_cast<Index>(1 + random.below(static_cast<std::uint64_t>(bodies)));
       if (a == b || !is_link(a) || !is_link(b)) continue;
@@ -280,7 +281,8 @@ class Maker {
       spec.name = fmt::format("spring{}", specs.size() + 1);
       if (kind == CouplingKind::rod) spec.length *= random.uniform(0.7, 1.3);
       // gains follow from what the rows move
-      for (const GapRow& row : rows_of(kind)) (row.kind == GapKind::product ? spec.turn : spec.shift).stiffness = 1;
+      const auto turns = [](const GapRow& row) { return row.kind == GapKind::product || row.kind == GapKind::angle; };
+      for (const GapRow& row : rows_of(kind)) (turns(row) ? spec.turn : spec.shift) = {1, 0};
       const Model sprung = coupled(*scene_.model, {spec});
       const reference::PlainTree tree = reference::plain_tree(sprung);
       const reference::PlainCouplings rows(tree, sprung.couplings, reference::Rows::giving_way);
@@ -292,12 +294,20 @@ class Maker {
       const double damped = random.uniform(0, 1) < 0.5 ? 0 : std::min(2 * log_uniform(0.02, 1), (scene_.stiff ? 4 : 0.3) / (w * h_));
       double shift = 0, turn = 0;  // what moves most
       for (Eigen::Index row = 0; row < moved.size(); ++row) {
-        const GapKind of = rows_of(kind)[static_cast<std::size_t>(row)].kind;
-        double& most = of == GapKind::product ? turn : shift;
+        double& most = turns(rows_of(kind)[static_cast<std::size_t>(row)]) ? turn : shift;
         most = std::max(most, moved[row]);
       }
-      spec.shift = shift > 0 ? Compliance{w * w / shift, damped * w / shift} : Compliance{};
-      spec.turn = turn > 0 ? Compliance{w * w / turn, damped * w / turn} : Compliance{};
+      spec.shift = shift > 0 ? Springs(w * w / shift, damped * w / shift) : Springs();
+      spec.turn = turn > 0 ? Springs(w * w / turn, damped * w / turn) : Springs();
+      if (kind == CouplingKind::bushing) {
+        // softer about some axes, free about some
+        for (Springs* springs : {&spec.shift, &spec.turn}) {
+          for (std::size_t axis = 1; axis < 3; ++axis) {
+            const double share = uneven.uniform(0, 1) < 0.2 ? 0 : uneven.uniform(0.1, 1);
+            springs->along[axis] = {share * springs->along[axis].stiffness, share * springs->along[axis].damping};
+          }
+        }
+      }
       specs.push_back(spec);
     }
     if (!specs.empty()) scene_.model = std::make_shared<const Model>(coupled(*scene_.model, specs));

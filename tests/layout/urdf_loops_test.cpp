@@ -271,9 +271,6 @@ TEST_CASE("what a loop says beside its place is told") {
   }
   CHECK(told_of(pair_and("<drake:tendon_constraint/>")) ==
         Strings{"test.urdf:2: known but not simulated: <drake:tendon_constraint>; the robot moves as if it were not there"});
-  CHECK(told_of(pair_and("<drake:linear_bushing_rpy/>")) ==
-        Strings{"test.urdf:2: known but not simulated: <drake:linear_bushing_rpy>; the robot moves as if it were not there; where it closes a loop, write a "
-                "<drake:ball_constraint> or a <loop_joint>"});
   CHECK_THAT(told_of(pair_and("<loop_joint><xacro:x/></loop_joint>")).front(), Contains(" macro "));
 }
 
@@ -297,6 +294,12 @@ TEST_CASE("nothing of a loop is misspelled, repeated or added in silence") {
     <drake:linear_spring_damper_p_AP value="0 0 1"/><drake:linear_spring_damper_p_BQ value="0 0 1"/>
     <drake:linear_spring_damper_free_length value="2"/><drake:linear_spring_damper_stiffness value="3"/><drake:linear_spring_damper_damping value="0.5"/>
   </drake:linear_spring_damper>
+  <frame name="f" link="b" xyz="0 0 1" rpy="0 0 1"/>
+  <drake:linear_bushing_rpy>
+    <drake:bushing_frameA name="a"/><drake:bushing_frameC name="f"/>
+    <drake:bushing_torque_stiffness value="1 2 3"/><drake:bushing_torque_damping value="4 5 6"/>
+    <drake:bushing_force_stiffness value="7 8 9"/><drake:bushing_force_damping value="10 11 12"/>
+  </drake:linear_bushing_rpy>
   <gazebo>
     <joint name="p" type="universal">
       <parent>a</parent><child>b</child><pose relative_to="a" degrees="false">0 0 1 0 0 1</pose>
@@ -305,7 +308,7 @@ TEST_CASE("nothing of a loop is misspelled, repeated or added in silence") {
     </joint>
   </gazebo>)";
   REQUIRE(told_of(pair_and(loops)) == Strings{});
-  REQUIRE(parse_urdf(pair_and(loops), "test.urdf").couplings.size() == 7);
+  REQUIRE(parse_urdf(pair_and(loops), "test.urdf").couplings.size() == 8);
   tinyxml2::XMLDocument document;
   REQUIRE(document.Parse(robot(loops).c_str()) == tinyxml2::XML_SUCCESS);
   std::vector<tinyxml2::XMLElement*> elements{document.RootElement()};
@@ -341,7 +344,7 @@ TEST_CASE("nothing of a loop is misspelled, repeated or added in silence") {
     element->InsertEndChild(text);
     CHECK(told());
     element->DeleteChild(text);
-    if (name == "drake:ball_constraint" || name == "drake:linear_spring_damper") continue;  // two of them are two
+    if (name == "drake:ball_constraint" || name == "drake:linear_spring_damper" || name == "drake:linear_bushing_rpy") continue;  // two of them are two
     auto* again = element->Parent()->InsertAfterChild(element, element->DeepClone(&document));
     CHECK(told());
     element->Parent()->DeleteChild(again);
@@ -362,12 +365,47 @@ TEST_CASE("a spring and damper of Drake is one between two points") {
   CHECK(found.name == "spring of a and world");
   CHECK(found.kind == CouplingKind::rod);
   CHECK(found.length == 2);
-  CHECK(found.shift.stiffness == 30);
-  CHECK(found.shift.damping == 0.5);
+  CHECK(found.shift[0].stiffness == 30);
+  CHECK(found.shift[0].damping == 0.5);
   CHECK(found.frame_b.shift[0] == 1);
   for (const std::string& wrong : {spring("0", "30", "1"), spring("2", "-1", "1"), spring("2", "0", "0"), spring("2", "x", "0")}) {
     CHECK(told_of(pair_and(wrong)).size() == 1);
     CHECK(parse_urdf(pair_and(wrong), "test.urdf").couplings.empty());
+  }
+}
+
+TEST_CASE("a bushing of Drake is one between two frames, each of the robot's or of a link") {
+  const auto bushing = [](const std::string& a, const std::string& c, const std::string& numbers) {
+    return "<frame name=\"fa\" link=\"a\" xyz=\"0.1 0.2 0.3\" rpy=\"0.4 0.5 0.6\"/><frame name=\"unused\" link=\"b\"/><drake:linear_bushing_rpy><drake:bushing_frameA name=\"" + a +
+           "\"/><drake:bushing_frameC name=\"" + c + "\"/>" + numbers + "</drake:linear_bushing_rpy>";
+  };
+  const auto number = [](const char* name, const char* value) { return fmt::format("<drake:bushing_{} value=\"{}\"/>", name, value); };
+  const std::string some = number("torque_stiffness", "1 2 3") + number("torque_damping", "4 5 6") + number("force_stiffness", "7 8 0") + number("force_damping", "10 11 0");
+  const Model model = parse_urdf(pair_and(bushing("fa", "b", some)), "test.urdf");
+  CHECK(model.warnings == Strings{"test.urdf:2: known but not simulated: 1 <frame>; other programs read them"});
+  REQUIRE(model.couplings.size() == 1);
+  const Coupling& found = model.couplings[0];
+  CHECK(found.name == "bushing of a and b");
+  CHECK(found.kind == CouplingKind::bushing);
+  CHECK(found.turn == Compliances{Compliance{1, 4}, {2, 5}, {3, 6}});
+  CHECK(found.shift == Compliances{Compliance{7, 10}, {8, 11}, {0, 0}});
+  CHECK(rows_of(found).size() == 5);
+  const Ends ends = ends_of(model, found);
+  CHECK(ends.a.isApprox(kA * at({0.1, 0.2, 0.3}, 0.4, 0.5, 0.6), 1e-14));
+  CHECK(ends.b.isApprox(kB, 1e-14));
+  CHECK(parse_urdf(pair_and(bushing("world", "fa", number("force_stiffness", "1 0 0"))), "test.urdf").couplings.at(0).slot_a == 0);
+  const std::pair<std::string, std::string> wrong[] = {
+      {bushing("fa", "fc", some), "link \"fc\" does not exist"},
+      {bushing("fa", "b", number("torque_stiffness", "0 0 0")), "it neither pulls nor damps"},
+      {bushing("fa", "b", number("torque_stiffness", "1 -1 0")), "<drake:bushing_torque_stiffness> has a number below zero"},
+      {bushing("fa", "b", number("torque_stiffness", "1 2")), "<drake:bushing_torque_stiffness> has value=\"1 2\""},
+  };
+  for (const auto& [xml, told] : wrong) {
+    CAPTURE(told);
+    const Strings all = told_of(pair_and(xml));
+    REQUIRE(all.size() == 2);
+    CHECK_THAT(all[0] + all[1], Contains("<drake:linear_bushing_rpy>: " + told));
+    CHECK(parse_urdf(pair_and(xml), "test.urdf").couplings.empty());
   }
 }
 

@@ -23,7 +23,7 @@ class PlainCouplings {
   PlainCouplings(const PlainTree& tree, std::vector<Coupling> couplings, Rows which = Rows::rigid) : tree_(tree), couplings_(std::move(couplings)) {
     Eigen::Index at = 0;
     for (const Coupling& one : couplings_) {
-      for (const GapRow& row : rows_of(one.kind)) {
+      for (const GapRow& row : rows_of(one)) {
         const Compliance& law = compliance_of(one, row);
         if (law.gives_way() == (which == Rows::giving_way)) {
           rows_.push_back(at);
@@ -98,6 +98,15 @@ class PlainCouplings {
           add({sqrt(apart.dot(apart)) - T(one.length)});
           break;
         }
+        case CouplingKind::bushing: {
+          using std::atan2, std::sqrt;
+          const Matrix3<T> turn = a.transpose() * b;
+          const Vector3<T> shifts = half_of(turn).transpose() * d;
+          const T level = sqrt(T(turn(0, 0) * turn(0, 0) + turn(1, 0) * turn(1, 0)));
+          const Vector3<T> angles(atan2(turn(2, 1), turn(2, 2)), atan2(T(-turn(2, 0)), level), atan2(turn(1, 0), turn(0, 0)));
+          for (const GapRow& row : rows_of(one)) all.push_back((row.kind == GapKind::angle ? angles : shifts)[row.a]);
+          break;
+        }
         case CouplingKind::gear:
         case CouplingKind::cable: break;
       }
@@ -139,6 +148,13 @@ class PlainCouplings {
   }
 
  private:
+  /// The root of a rotation of less than half a turn: the mean of none and all of it, made orthonormal (Newton's iteration for the polar factor).
+  template <class T>
+  static Matrix3<T> half_of(const Matrix3<T>& turn) {
+    Matrix3<T> half = Matrix3<T>::Identity() + turn;
+    for (int k = 0; k < 20; ++k) half = Matrix3<T>(T(0.5) * (half + half.inverse().transpose()));
+    return half;
+  }
   static Matrix4<double> matrix_of(const Pose& pose) {
     Matrix4<double> m = Matrix4<double>::Identity();
     for (int row = 0; row < 3; ++row) {
