@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,16 @@ double largest_gap(const CouplingState& state) {
   double largest = 0;
   for (const double gap : state.gaps) largest = std::max(largest, std::abs(gap));
   return largest;
+}
+
+/// Times what the tree takes itself, that are worth another look at where loops are cut.
+constexpr double kDear = 4;
+
+/// "pin", "rung0 and 39 more"
+std::string names_of(const Model& model, const ClosureWork& closure) {
+  const std::string first = printable(model.couplings[static_cast<std::size_t>(closure.couplings.front())].name);
+  const auto others = std::ssize(closure.couplings) - 1;
+  return others == 0 ? first : fmt::format("{} and {} more", first, grouped(others));
 }
 
 }  // namespace
@@ -90,6 +101,47 @@ nlohmann::ordered_json couplings_json(const Model& model, const Mobility& mobili
                          {"held_already", state.redundant}});
   }
   return couplings;
+}
+
+
+void say_closures(const Model& model, const std::vector<ClosureWork>& closures, std::size_t count) {
+  using Align = Table::Align;
+  const double tree = kTreeFactorOperations * model.tree.bodies();
+  Table table({{"closes at", Align::left},
+               {"couplings", Align::left},
+               {"rows", Align::right},
+               {"velocities", Align::right},
+               {"operations", Align::right},
+               {"of the tree's", Align::right}});
+  for (const ClosureWork& one : std::span(closures).first(count)) {
+    table.add({printable(model.names.body[static_cast<std::size_t>(one.slot)]), names_of(model, one), grouped(one.rows), grouped(one.velocities),
+               fmt::format("{:.1e}", one.operations), fmt::format("{:.2g}", one.operations / tree)});
+  }
+  say_text(table.text("  "));
+  if (count < closures.size()) say("  ... and {} more; --all prints them\n", grouped(static_cast<std::int64_t>(closures.size() - count)));
+  double sum = 0;
+  for (const ClosureWork& one : closures) sum += one.operations;
+  say("  a factor takes {:.1e} operations for all of them, {:.2g} of the tree's own; velocities: of all joints on their paths\n", sum, sum / tree);
+  const ClosureWork& dearest = closures.front();
+  if (dearest.couplings.size() == 1 || dearest.operations < kDear * tree) return;
+  say("  dear: {} that close at {} take {:.2g} times what the tree itself does, since their loops share joints\n"
+      "  and are solved for together; cut at other joints, so that each loop closes near its own links, they may take less\n",
+      counted(std::ssize(dearest.couplings), "coupling"), printable(model.names.body[static_cast<std::size_t>(dearest.slot)]),
+      dearest.operations / tree);
+}
+
+nlohmann::ordered_json closures_json(const Model& model, const std::vector<ClosureWork>& closures) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const ClosureWork& one : closures) {
+    nlohmann::ordered_json names = nlohmann::ordered_json::array();
+    for (const Index k : one.couplings) names.push_back(model.couplings[static_cast<std::size_t>(k)].name);
+    all.push_back({{"closes_at", model.names.body[static_cast<std::size_t>(one.slot)]},
+                   {"couplings", names},
+                   {"rows", one.rows},
+                   {"velocities", one.velocities},
+                   {"operations", one.operations}});
+  }
+  return all;
 }
 
 }  // namespace linden

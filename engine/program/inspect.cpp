@@ -320,6 +320,9 @@ class Printer {
     if (model_.couplings.empty()) return;
     say("\ncouplings, {}\n", arguments_.scene ? "where the scene begins" : "in the zero configuration");
     say_couplings(model_, mobility_, shown(model_.couplings.size()));
+    const std::vector<ClosureWork> closures = closure_work(model_);
+    say("\nwhere loops close, the dearest first\n");
+    say_closures(model_, closures, shown(closures.size()));
   }
 
   void sweeps() const {
@@ -416,6 +419,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
                       {"offset", mimic.offset}});
   }
   result["couplings"] = couplings_json(model, mobility);
+  result["closures"] = closures_json(model, closure_work(model));
   Json& sweeps = result["sweeps"] = Json::array();
   for (std::size_t k = 0; k < costs.sweeps.size(); ++k) {
     const Sweep& sweep = costs.sweeps[k];

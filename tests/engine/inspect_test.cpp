@@ -51,6 +51,25 @@ TEST_CASE("inspect shows axes as directions, massless bodies, tied joints and wh
   CHECK_THAT(shell.linden("inspect g.urdf --base floating").out, !Contains("fixed to the world"));
 }
 
+TEST_CASE("inspect counts what a factor takes where loops close, and notes the cut that is dear", "[inspect]") {
+  const Shell shell;
+  const Outcome ladder = shell.linden("inspect ladder:6 --json l.json");
+  REQUIRE(ladder.exit_code == 0);
+  CHECK_THAT(ladder.out, Contains("where loops close, the dearest first") && Contains("a factor takes") && !Contains("dear:"));
+  const nlohmann::json closures = nlohmann::json::parse(text_of(shell / "l.json")).at("closures");
+  REQUIRE(closures.size() == 6);
+  double before = closures[0].at("operations");
+  for (const nlohmann::json& closure : closures) {
+    CHECK(closure.at("rows") == 5);
+    CHECK(closure.at("couplings").size() == 1);
+    CHECK(closure.at("operations") <= before);
+    before = closure.at("operations");
+  }
+  CHECK(before > 1000);
+  CHECK_THAT(shell.linden("inspect net:8x6").out, Contains("dear: 42 couplings that close at world take"));
+  CHECK_THAT(shell.linden("inspect chain:3").out, !Contains("where loops close"));
+}
+
 TEST_CASE("one rigid body without a joint is refused with what lets it move", "[inspect]") {
   const Shell shell;
   shell.write("one.urdf", "<robot name=\"one\"><link name=\"a\">" + std::string(kInertial) + "</link></robot>");
