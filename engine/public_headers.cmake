@@ -66,6 +66,7 @@ set(linden_public_headers
   models/build/generators.hpp
   models/build/isometry.hpp
   models/build/merged_models.hpp
+  models/shapes/collision_pairs.hpp
   models/shapes/contacts_of.hpp
   models/urdf/urdf.hpp)
 
