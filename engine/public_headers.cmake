@@ -30,6 +30,7 @@ set(linden_public_headers
   engine/queries/mass_matrix.hpp
   engine/queries/matrix.hpp
   engine/queries/observations.hpp
+  engine/queries/proximity.hpp
   engine/queries/step_forces.hpp
   engine/randomization.hpp
   engine/scene/load_model.hpp

@@ -2,6 +2,7 @@
 // What can be asked of a state (engine/queries).
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -16,6 +17,7 @@
 #include "engine/queries/jacobian.hpp"
 #include "engine/queries/link_motion.hpp"
 #include "engine/queries/mass_matrix.hpp"
+#include "engine/queries/proximity.hpp"
 #include "engine/queries/step_forces.hpp"
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
@@ -263,6 +265,78 @@ void bind_dynamics(nb::class_<Kinematics>& c) {
           "that body's frame, moment [N m] about its origin, force [N]; row 0: what all that hangs on the world gives it.");
 }
 
+/// Distances of links, and what is near what.
+void bind_proximity(nb::module_& m) {
+  nb::class_<LinkDistance>(m, "LinkDistance", "How far two links are apart, world frame.")
+      .def_ro("distance", &LinkDistance::distance, "[m]; negative where they overlap, by the least shift that would part them.")
+      .def_prop_ro(
+          "normal", [](const LinkDistance& self) { return fixed_array(std::span<const double>(self.normal)); }, "From a to b, unit length [3].")
+      .def_prop_ro(
+          "on_a", [](const LinkDistance& self) { return fixed_array(std::span<const double>(self.on_a)); },
+          "The nearest place of a; where they overlap that which reaches the farthest into b [3; m].")
+      .def_prop_ro(
+          "on_b", [](const LinkDistance& self) { return fixed_array(std::span<const double>(self.on_b)); }, "Likewise of b [3; m].")
+      .def("__repr__", [](const LinkDistance& self) {
+        return fmt::format("LinkDistance(distance={:.6g}, normal=[{:.6g}, {:.6g}, {:.6g}])", self.distance, self.normal[0], self.normal[1],
+                           self.normal[2]);
+      });
+  nb::class_<NearPair>(m, "NearPair", "Two collision shapes that are near each other, and the one to four points where they meet, world frame.")
+      .def_ro("link_a", &NearPair::link_a)
+      .def_ro("link_b", &NearPair::link_b)
+      .def_ro("distance", &NearPair::distance, "[m]; negative where they overlap, by the least shift that would part them.")
+      .def_prop_ro(
+          "normal", [](const NearPair& self) { return fixed_array(std::span<const double>(self.normal)); }, "From a to b, unit length [3].")
+      .def_prop_ro(
+          "places",
+          [](const NearPair& self) {
+            std::vector<double> numbers;
+            for (const NearPoint& point : self.points) numbers.insert(numbers.end(), point.place.begin(), point.place.end());
+            return fixed_array(std::move(numbers), {self.points.size(), 3});
+          },
+          "Midway between both surfaces [points x 3; m].")
+      .def_prop_ro(
+          "gaps",
+          [](const NearPair& self) {
+            std::vector<double> numbers;
+            for (const NearPoint& point : self.points) numbers.push_back(point.gap);
+            return fixed_array(std::move(numbers));
+          },
+          "Along the normal; negative where they overlap [points; m].")
+      .def_prop_ro(
+          "features",
+          [](const NearPair& self) {
+            std::vector<std::uint64_t> numbers;
+            for (const NearPoint& point : self.points) numbers.push_back(point.feature);
+            return numbers;
+          },
+          "Which corners, edges and faces meet: the same number as long as these do.")
+      .def("__repr__", [](const NearPair& self) {
+        return fmt::format("NearPair({} and {}, distance={:.6g}, {} points)", self.link_a, self.link_b, self.distance, self.points.size());
+      });
+  nb::class_<Proximity>(m, "Proximity",
+                        "How far links are apart, which of them touch, and where: of the collision shapes of the robot's file, meshes as their "
+                        "convex hulls. They do not act on each other.")
+      .def(nb::init<const Model&, const LinkPairs&>(), "model"_a, "disabled"_a = LinkPairs{},
+           "Reads the meshes: make it once.\n\ndisabled: pairs of links that near leaves out, beside neighbours; linden.srdf_disabled_pairs reads "
+           "them from a file.")
+      .def(
+          "distance",
+          [](const Proximity& self, const Kinematics& state, const std::string& link_a, const std::string& link_b) {
+            return freely([&] { return self.distance(state, link_a, link_b); });
+          },
+          "state"_a, "link_a"_a, "link_b"_a,
+          "Of the nearest collision shapes of two links, neighbours too. An unknown link, one without a collision shape and a link with itself are "
+          "an InputError.")
+      .def(
+          "near", [](const Proximity& self, const Kinematics& state, double margin) { return freely([&] { return self.near(state, margin); }); },
+          "state"_a, "margin"_a,
+          "All pairs of shapes no farther apart than the margin [m], in a fixed order. Left out are shapes of one body, neighbours in the tree, "
+          "what a coupling ties, and disabled pairs.")
+      .def_prop_ro("notes", &Proximity::notes, "Which meshes were not found or not read, and so touch nothing, and how many stand as their hulls.");
+  m.def("srdf_disabled_pairs", &srdf_disabled_pairs, "file"_a,
+        "The pairs of links that an SRDF file disables, <disable_collisions>. Raises InputError for a file that is not there or no SRDF.");
+}
+
 }  // namespace
 
 Frame frame_from(const std::string& name) {
@@ -283,6 +357,7 @@ void bind_queries(nb::module_& m) {
   bind_asked_state(c);
   bind_motion(c);
   bind_dynamics(c);
+  bind_proximity(m);
   m.def(
       "step_forces",
       [](const Model& model, nb::handle q0, nb::handle q1, nb::handle q2, double step, nb::handle gravity) {

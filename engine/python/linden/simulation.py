@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._core import CentreOfMass, Model, Pose, Scene
+from ._core import CentreOfMass, LinkDistance, Model, NearPair, Pose, Proximity, Scene
 from .errors import InputError, name_list
 from .scenes import Settings, made_scene
 from .views import View, motion_of
@@ -30,6 +30,7 @@ class Simulation(_core.Simulation):
     def __init__(self, model: Model | Scene | str | os.PathLike[str], **settings: Unpack[Settings]) -> None:
         super().__init__(made_scene(model, settings, 2))
         self._observations: dict[tuple[str, ...], _core.Observations] = {}
+        self._shapes: Proximity | None = None
 
     # what is asked most, of the state as it is now; more can be asked of kinematics()
     def pose(self, link: str) -> Pose:
@@ -65,6 +66,26 @@ class Simulation(_core.Simulation):
         now = self.kinematics()
         now.set(now.q, now.v, a)
         return now.inverse_dynamics()
+
+    @property
+    def _proximity(self) -> Proximity:
+        if self._shapes is None:
+            self._shapes = Proximity(self.model)
+        return self._shapes
+
+    def distance(self, link_a: str, link_b: str) -> LinkDistance:
+        """How far the collision shapes of two links are apart, and along which direction; meshes are their convex hulls.
+
+        The meshes are read when it is first asked. An unknown link and one without a collision shape are an InputError.
+        """
+        return self._proximity.distance(self._kinematics, link_a, link_b)
+
+    def near(self, margin: float) -> list[NearPair]:
+        """All pairs of collision shapes no farther apart than the margin [m], with the points where they meet; neighbours are left out.
+
+        With pairs of an SRDF file left out too: linden.Proximity(model, linden.srdf_disabled_pairs(file)).near(sim.kinematics(), margin).
+        """
+        return self._proximity.near(self._kinematics, margin)
 
     @property
     def centre_of_mass(self) -> CentreOfMass:
