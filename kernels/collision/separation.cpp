@@ -376,7 +376,7 @@ Separation polished(const PlacedConvex& a, const PlacedConvex& b, const Vec3<dou
 
 Separation separation(const PlacedConvex& a, const PlacedConvex& b, double size, double margin) {
   const bool polyhedra = is_polyhedron(a.shape) && is_polyhedron(b.shape);
-  const double close = polyhedra ? 1e-15 : 1e-12;  // of v.v: where a step brings no more than this
+  const double close = polyhedra ? 1e-15 : 1e-9;  // of v.v: where a step brings no more than this; the polish does the rest
   Vec3<double> start = b.p - a.p;
   if (dot(start, start) == 0) start = {1, 0, 0};
   Simplex simplex;

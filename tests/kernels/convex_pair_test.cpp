@@ -356,7 +356,12 @@ TEST_CASE("shapes of a micrometre and of a kilometre, flat ones and such without
     return shape;
   };
   double worst = 0;
-  for (int k = 0; k < 100000; ++k) {
+#ifdef LINDEN_SANITIZED
+  const int pairs = 5000;  // some minutes for all
+#else
+  const int pairs = 100000;
+#endif
+  for (int k = 0; k < pairs; ++k) {
     const ConvexShape a = pick(), b = pick();
     REQUIRE((a.kind != ConvexKind::hull || a.hull));
     REQUIRE((b.kind != ConvexKind::hull || b.hull));
