@@ -55,6 +55,10 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
       plan(*model, options, effects),
       arena(threads) {
   check_order(options.order, *model, effects);
+  if (plan.pairs) {
+    throw InputError("effects.contact: contact of bodies with each other is not stepped in a batch; expected a scene without it; step each instance as "
+                     "a simulation of its own, or leave contact out");
+  }
   require_threads(threads);
   first_child.assign(static_cast<std::size_t>(shape().slots) + 1, 0);
   for (Index slot = 1; slot < shape().slots; ++slot) ++first_child[static_cast<std::size_t>(model->tree.parent(slot)) + 1];

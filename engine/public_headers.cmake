@@ -50,6 +50,7 @@ set(linden_public_headers
   layout/attributes.hpp
   layout/body_constants.hpp
   layout/contacts.hpp
+  layout/convex.hpp
   layout/couplings.hpp
   layout/effects.hpp
   layout/field.hpp
@@ -69,6 +70,7 @@ set(linden_public_headers
   models/build/merged_models.hpp
   models/shapes/collision_pairs.hpp
   models/shapes/contacts_of.hpp
+  models/shapes/pair_contact.hpp
   models/urdf/urdf.hpp)
 
 # and the values of every effect

@@ -52,12 +52,13 @@ struct BodyContact {
   double normal_force = 0;  // of all of them, mean over the step [N]
 };
 
-/// Where the ground pushes a body, in the step taken last.
+/// Where the ground pushes a body, or another body does, in the step taken last.
 struct ContactPoint {
-  Index slot;                        // body that it pushes
+  Index slot;                        // body that is pushed
   std::array<double, 3> place{};     // where they touch, world frame [m]
-  std::array<double, 3> normal{};    // of the ground there, unit length, world frame
+  std::array<double, 3> normal{};    // of the ground there, or of what pushes, towards the body; unit length, world frame
   std::array<double, 3> force{};     // on the body, friction with it, mean over the step; world frame [N]
+  Index other = 0;                   // body that pushes; 0: the ground, or what is fixed to the world
 };
 
 class Simulation {
@@ -139,8 +140,8 @@ class Simulation {
   std::vector<double> servo_torques() const;
   /// Of every body that may touch the ground, sorted by slot.
   std::vector<BodyContact> contacts() const;
-  /// Every place where the ground pushes at the end of the step, sorted by slot; the forces of one that it pushed before, and does not any
-  /// more, are not among them.
+  /// Every place where the ground pushes at the end of the step, sorted by slot; then every place where bodies push each other, once, in the order of
+  /// their pairs. The forces of one that was pushed before, and is not any more, are not among them.
   std::vector<ContactPoint> contact_points() const;
   /// Wrench of all effects on each body [slots x 6]: moment about its origin [N m], force [N]; in the frame that the body had when the step
   /// began.

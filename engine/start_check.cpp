@@ -10,6 +10,7 @@
 
 #include "engine/effects/effect_plan.hpp"
 #include "engine/scene/scene.hpp"
+#include "engine/sweeps/body_contacts.hpp"
 #include "kernels/effects/ground.hpp"
 #include "kernels/effects/terrain_height.hpp"
 #include "kernels/tree/placement_map.hpp"
@@ -90,6 +91,7 @@ StartFindings StartCheck::look(std::span<const double> positions) const {
   look_at_ties(found);
   look_at_limits(found);
   look_at_ground(found);
+  look_at_contact(found);
   return found;
 }
 
@@ -156,17 +158,39 @@ void StartCheck::look_at_limits(StartFindings& found) const {
 
 double StartCheck::allowed(Index slot) const { return std::max(kShallow, sag_[at(root_[at(slot)])]); }
 
-void StartCheck::look_at_ground(StartFindings& found) const {
-  if (plan_->ground.points.empty()) return;
+Field<double, 12> StartCheck::poses(const std::vector<double>& positions) const {
   const Tree& tree = model_.tree;
   Field<double> q;
   q.allocate(tree.shape.positions);
-  std::ranges::copy(found.positions, q.flat().begin());
+  std::ranges::copy(positions, q.flat().begin());
   Field<double, 12> placement, pose;
   placement.allocate(tree.shape.slots);
   pose.allocate(tree.shape.slots);
   placement_map(tree, model_.constants, q, placement);
   world_placement_down(tree, placement, pose);
+  return pose;
+}
+
+void StartCheck::look_at_contact(StartFindings& found) const {
+  if (!plan_->pairs) return;
+  BodyContacts contacts(*plan_->effects.contact);
+  contacts.find(poses(found.positions));
+  std::map<std::size_t, double> depth;  // of the deepest place of a pair
+  for (const BodyContacts::Touch& touch : contacts.touches()) {
+    if (-touch.gap > kShallow) depth[touch.pair] = std::max(depth[touch.pair], -touch.gap);
+  }
+  const PairContact& contact = *plan_->effects.contact;
+  for (const auto& [pair, deep] : depth) {
+    const auto& [a, b] = contact.pairs[pair];
+    found.told.push_back(fmt::format("links {} and {} start {:.4g} m deep in each other: they are pushed apart at {:g} m/s", quoted(contact.shapes[a].link),
+                                     quoted(contact.shapes[b].link), deep, kRecoverySpeed));
+  }
+}
+
+void StartCheck::look_at_ground(StartFindings& found) const {
+  if (plan_->ground.points.empty()) return;
+  const Tree& tree = model_.tree;
+  const Field<double, 12> pose = poses(found.positions);
   GroundPoints<double> points;
   points.allocate({.slots = static_cast<Index>(plan_->ground.points.size())});
   find_ground(plan_->ground, pose, points);

@@ -9,6 +9,7 @@
 //   ground  a contact of a body lies deeper than kShallow, and deeper than M g / k: what the ground, of stiffness k at one point, gives way
 //           at rest under the whole tree of M that the body belongs to. No load at rest sinks deeper. Over a terrain what counts is the depth
 //           straight down from a centre, as people place things by the height of what lies below: what lies deeper across a slope is told.
+//   contact shapes that touch each other lie deeper than kShallow: told, they are pushed apart slowly (engine/sweeps/body_contacts.hpp)
 //
 // Speeds are not looked at. What each fault says: joint or link, value, limit, what to do.
 #pragma once
@@ -58,6 +59,9 @@ class StartCheck {
   void look_at_ties(StartFindings& found) const;
   void look_at_limits(StartFindings& found) const;
   void look_at_ground(StartFindings& found) const;
+  void look_at_contact(StartFindings& found) const;
+  /// Poses of bodies in the world.
+  Field<double, 12> poses(const std::vector<double>& positions) const;
   /// Depth in the ground that a body may start with [m].
   double allowed(Index slot) const;
   void follow(std::vector<double>& positions) const;

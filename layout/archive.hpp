@@ -22,6 +22,7 @@
 #include <string_view>
 #include <type_traits>
 #include <unordered_map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -79,6 +80,12 @@ class BytesOut {
   template <class T>
   void put(const std::optional<T>& value) {
     add(value.has_value());
+    if (value) add(*value);
+  }
+  /// What is shared is there once for each who has it.
+  template <class T>
+  void put(const std::shared_ptr<const T>& value) {
+    add(value != nullptr);
     if (value) add(*value);
   }
   template <class First, class Second>
@@ -179,6 +186,16 @@ class BytesIn {
     read(there);
     value.reset();
     if (there) read(value.emplace());
+  }
+  template <class T>
+  void take(std::shared_ptr<const T>& value) {
+    bool there = false;
+    read(there);
+    value.reset();
+    if (!there) return;
+    auto own = std::make_shared<T>();
+    read(*own);
+    value = std::move(own);
   }
   template <class First, class Second>
   void take(std::pair<First, Second>& two) {

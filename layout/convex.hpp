@@ -16,7 +16,11 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
+
+#include "layout/field.hpp"
+#include "layout/pose.hpp"
 
 namespace linden {
 
@@ -44,6 +48,14 @@ struct ConvexShape {
   std::array<double, 3> half{};                    // [m]
   double radius = 0;                               // about the core [m]
   std::shared_ptr<const ConvexHull> hull{};        // of that kind alone; never empty there
+};
+
+/// One of a model.
+struct ConvexBody {
+  Index slot;        // body that carries it; 0: fixed to the world
+  std::string link;  // that has it
+  Pose pose;         // of the shape's axes in the body's frame
+  ConvexShape shape;
 };
 
 }  // namespace linden

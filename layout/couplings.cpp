@@ -20,6 +20,7 @@ constexpr std::array kPointOnPlane{along_z};
 constexpr std::array kRod{GapRow{GapKind::length}};
 constexpr std::array kGear{GapRow{GapKind::sum}};
 constexpr std::array kCable{GapRow{GapKind::length}};
+constexpr std::array kRoundContact{along_x, along_y, GapRow{GapKind::length}};
 constexpr std::array kBushing{GapRow{GapKind::halfway, 0}, GapRow{GapKind::halfway, 1}, GapRow{GapKind::halfway, 2},
                               GapRow{GapKind::angle, 0},   GapRow{GapKind::angle, 1},   GapRow{GapKind::angle, 2}};
 
@@ -72,6 +73,8 @@ std::span<const GapRow> rows_of(CouplingKind kind) {
     case CouplingKind::rod: return kRod;
     case CouplingKind::gear: return kGear;
     case CouplingKind::cable: return kCable;
+    case CouplingKind::face_contact: return kBall;
+    case CouplingKind::round_contact: return kRoundContact;
     case CouplingKind::bushing: return kBushing;
   }
   return {};

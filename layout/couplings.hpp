@@ -18,6 +18,13 @@
 //   cable           sum of |x_k+1 - x_k| = q, through points of two bodies      1
 //                   or more; q: of a joint of its own, which is its length
 //
+//
+// Two shapes that touch are coupled for a step, by rows with the law of kernels/couplings/contact_solve.hpp. A and B lie where they touch, z along
+// the normal from a to b; `rounding` tells how far the middle of each lies behind, so that what rolls is met at its lowest place:
+//
+//   face_contact    d_x, d_y; of the middles d_z - roundings           3   a has the face, z is fixed in it
+//   round_contact   d_x, d_y; of the middles |d| - roundings           3
+//
 // Rows may give way: springs and dampers along their gaps instead of multipliers (kernels/couplings/compliance.hpp). A rod that does is a
 // spring between two points. A bushing has nothing but such rows, those that have a stiffness or damping.
 #pragma once
@@ -33,8 +40,12 @@
 
 namespace linden {
 
-enum class CouplingKind : std::uint8_t { ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear, cable, bushing };
+enum class CouplingKind : std::uint8_t {
+  ball, hinge, universal, cylindrical, slider, weld, point_on_line, point_on_plane, rod, gear, cable, bushing, face_contact, round_contact
+};
+/// That people name: all but contacts.
 inline constexpr int kCouplingKinds = 12;
+constexpr bool is_contact(CouplingKind kind) { return kind == CouplingKind::face_contact || kind == CouplingKind::round_contact; }
 
 /// What a row asks for.
 enum class GapKind : std::uint8_t {
@@ -81,6 +92,7 @@ struct Coupling {
   std::vector<GearTerm> terms{}; // of a gear; of a cable one, its length
   double offset = 0;             // of a gear
   std::vector<CablePoint> points{};  // of a cable, from end to end
+  std::array<double, 2> rounding{};  // [m], of a contact
   Compliances shift{}, turn{};   // of rows in m [N/m, N s/m]; of angles, products, which near zero are angles, and gears [N m, N m s]
 };
 

@@ -19,6 +19,7 @@
 
 #include "layout/effects/armature.hpp"
 #include "layout/effects/ball_spring.hpp"
+#include "layout/effects/contact.hpp"
 #include "layout/effects/damping.hpp"
 #include "layout/effects/dead_zone_spring.hpp"
 #include "layout/effects/drag.hpp"
@@ -51,7 +52,8 @@ struct Model;
   LIST(std::vector<JointMotion>, motions)              \
   LIST(std::vector<BodyWrench>, wrenches)              \
   LIST(std::vector<Drag>, drag)                        \
-  LIST(std::optional<Ground>, ground)
+  LIST(std::optional<Ground>, ground)                  \
+  LIST(std::optional<PairContact>, contact)
 
 /// Entries of a list, none or one of what there is once.
 template <class Entry>

@@ -75,6 +75,12 @@ std::string effect_owners(const EffectPlan& plan, const Names& names) {
   Effects::each(plan.effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
     if constexpr (std::is_same_v<Entry, Ground>) {
       add(plan.ground.ground.terrain ? "points of a terrain" : Entry::facts.owners, plan.ground.points);
+    } else if constexpr (std::is_same_v<Entry, PairContact>) {
+      for (const PairContact& contact : entries) {
+        text += Entry::facts.owners;
+        for (const auto& [a, b] : contact.pairs) text.append(1, '\0').append(contact.shapes[a].link).append(" and ").append(contact.shapes[b].link);
+        text += '\n';
+      }
     } else {
       add(Entry::facts.owners, entries);
     }

@@ -135,6 +135,7 @@ EffectPlan::EffectPlan(const Model& model, const Options& options, const Effects
   const LawSetup known = setup(tree);
   sort_bodies(known);
   bodies = !loaded_bodies.empty();
+  pairs = effects.contact && !effects.contact->pairs.empty();
   follow_laws(known);
   bounces = std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return limit.restitution > 0; });
   if (std::ranges::any_of(effects.limits, [](const JointLimit& limit) { return std::isfinite(limit.velocity); })) {
@@ -225,6 +226,7 @@ void EffectPlan::follow_laws(const LawSetup& setup) {
     }
     is_implicit.template operator()<Law>(list, [&](const auto& entry) { return setup.inertia_at(entry.row); });
   });
+  has_states = has_states || pairs;
   bends = bends || has_states;
 }
 

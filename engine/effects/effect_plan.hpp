@@ -38,12 +38,13 @@ struct EffectPlan {
   Effects effects;       // of bodies sorted by their slots
   bool joints = false;   // some effect acts on joints
   bool bodies = false;   // on bodies
+  bool pairs = false;    // between bodies
   bool balls = false;    // some acts on ball joints, whose displacement is then needed at every evaluation
   bool bounces = false;  // some limit has a restitution
   bool has_states = false;  // what acts is settled within the solve: some effect has states
   bool bends = false;    // velocities are held to how the motion bends (engine/VELOCITY.md): something has states, or acts more at
                          // the beginning of a step
-  bool any() const { return joints || bodies; }
+  bool any() const { return joints || bodies || pairs; }
 
   Field<Index> q_row;               // position row of a screw's velocity row
   std::vector<SmoothCurve> curves;  // of every given motion

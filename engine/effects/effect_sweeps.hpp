@@ -46,6 +46,7 @@ class EffectSweeps {
         body_laws_(laws_of<BodyLaws<S>>(plan.setup(model.tree))) {
     sum_.allocate(tree_.shape);  // factors of blocks add joints and bodies whichever there are
     for (Field<S>* field : {&excess_, &excess_before_, &reading_, &bend_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
+    if (plan.pairs) between_.allocate(tree_.shape.velocities);
     if (plan.rotor.rows() > 0) {
       rotors_.allocate(plan.rotor.rows());
       for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
@@ -68,8 +69,8 @@ class EffectSweeps {
     const Field<S>& stiffness = sum_.stiffness;
     const Field<S, 36>& body_stiffness = bodies_.body_stiffness;
     if (plan_.joints && plan_.bodies) return action(EffectsAdded<S, true, true>{stiffness, body_stiffness});
-    if (plan_.joints) return action(EffectsAdded<S, true, false>{stiffness, body_stiffness});
-    action(EffectsAdded<S, false, true>{stiffness, body_stiffness});
+    if (plan_.bodies) return action(EffectsAdded<S, false, true>{stiffness, body_stiffness});
+    action(EffectsAdded<S, true, false>{stiffness, body_stiffness});  // where all acts between bodies, zeros
   }
   /// The same for the mass matrix, of which armature is the only part that is an effect.
   template <class Action>
@@ -279,6 +280,8 @@ class EffectSweeps {
     for (const JointMotion& one : motions().entries) excess_(one.row) = zero;  // what moves it is no stop
   }
 
+  /// Before end_reading: what acts between bodies more at the beginning of the step than at its end, half of it.
+  void add_to_reading(const Field<S>& excess) { std::ranges::copy(excess.flat(), between_.flat().begin()); }
   /// At the end of a step, once the bodies are where it leaves them: what velocities are read from beside p (engine/VELOCITY.md).
   /// `moves`: in which instances. before: displacement of the step before, as long as this one, where that is `known`. scratch, projected:
   /// 6 x n, nv.
@@ -287,15 +290,19 @@ class EffectSweeps {
                    const Field<S>& before, const Mask& known, Field<S, 6>& scratch, Field<S>& projected) {
     using std::abs;
     const S most = as<S>(kMostRead), zero(0.0), rate = as<S>(kMostBend) / h_, any = as<S>(kAnyBend);
+    const bool on_bodies = plan_.bodies || plan_.pairs;
     if (plan_.bodies) {
       std::ranges::copy(bodies_.start_excess.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
+    } else if (on_bodies) {
+      std::ranges::fill(projected.flat(), zero);
     }
+    for (Index row = 0; row < between_.rows(); ++row) projected(row) = projected(row) + between_(row);
     auto stopped = zero > zero;  // a limit has stopped a joint, and changed all velocities
     for (Index row = 0; row < reading_.rows(); ++row) {
       S read = plan_.joints ? excess_(row) : zero;
       stopped = stopped || (read > most && delta(row) != zero);
-      if (plan_.bodies) {
+      if (on_bodies) {
         read = select(read > most, read, read + persistent(projected(row), excess_before_(row)));
         excess_before_(row) = select(moves, projected(row), excess_before_(row));
       }
@@ -441,6 +448,7 @@ class EffectSweeps {
   const Tree& tree_;
   S h_{};
   double stiction_speed_ = 0;
+  Field<S> between_;           // see add_to_reading; no rows where nothing acts between bodies
   Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
   Field<S> excess_before_;     // the same of bodies, seen from the joints, of the step before
   Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held

@@ -5,11 +5,14 @@
 //   bodies    J = S^T F, F the wrenches of wrenches, drag and ground summed over subtrees (body_impulses.hpp)
 //   servos    of each alone, as its law and its limit have it (servo.hpp)
 //   ground    h N of each contact point (ground.hpp)
+//   touches   of each place where bodies push each other (engine/sweeps/body_contacts.hpp)
 //
 // cost    one pass up the tree where something acts on bodies
 #pragma once
 
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "engine/effects/effect_sweeps.hpp"
 #include "engine/effects/step_impulses.hpp"
@@ -26,7 +29,7 @@ class ImpulseAccount {
     sum_.servos.assign(plan.effects.servos.size(), 0);
     sum_.ground.assign(plan.ground.points.size(), 0);
     sum_.closed.assign(plan.ground.points.size(), 0);
-    if (plan.bodies) sum_.bodies.assign(static_cast<std::size_t>(shape.slots) * 6, 0);
+    if (plan.bodies || plan.pairs) sum_.bodies.assign(static_cast<std::size_t>(shape.slots) * 6, 0);
     for (std::vector<double>* numbers : {&sum_.pushes, &sum_.normals, &sum_.places}) numbers->assign(plan.ground.points.size() * 3, 0);
     projected_.allocate(shape.velocities);
     end_.allocate(shape.velocities);
@@ -70,6 +73,22 @@ class ImpulseAccount {
       sum_.closed[k] = points.closed(static_cast<Index>(k)) > 0.5 ? 1 : 0;
       if (points.push(static_cast<Index>(k)) != 0) add_push(effects, plan.ground.points[k].slot, k, h);
     }
+  }
+
+  /// What bodies did to each other in a part: touches, and seen from the joints [N m s, N s]; pose: of bodies in the world, at its beginning.
+  void add_between(std::vector<TouchImpulse> touches, const Field<double, 12>& pose, const Field<double>& joints) {
+    for (Index row = 0; row < joints.rows(); ++row) sum_.joints[static_cast<std::size_t>(row)] += joints(row);
+    for (const TouchImpulse& touch : touches) {
+      for (const auto& [slot, sign] : {std::pair(touch.slot_a, -1.0), std::pair(touch.slot_b, 1.0)}) {
+        if (slot == 0) continue;
+        const auto T = load<Placement, double>(pose, slot);
+        const Vec3<double> push = sign * Vec3<double>::from(touch.impulse.data()), arm = Vec3<double>::from(touch.place.data()) - T.p;
+        double* const wrench = &sum_.bodies[6 * static_cast<std::size_t>(slot)];
+        (Vec3<double>::from(wrench) + transpose_times(T.R, cross(arm, push))).to(wrench);
+        (Vec3<double>::from(wrench + 3) + transpose_times(T.R, push)).to(wrench + 3);
+      }
+    }
+    sum_.add_touches(std::move(touches));
   }
 
  private:

@@ -149,12 +149,20 @@ std::string what_of(std::span<const Ground> list, const Effects&, const Model&) 
                      counted(static_cast<std::int64_t>(ground.contacts.spheres.size() + ground.contacts.rims.size()), "contact"));
 }
 
-/// "23 joints", "1 body", "plane".
+std::string what_of(std::span<const PairContact> list, const Effects&, const Model&) {
+  const PairContact& contact = list.front();
+  return fmt::format("stiffness {:g} N/m, friction {:g}; {}", contact.stiffness, contact.friction,
+                     counted(std::ssize(contact.pairs), "pair"));
+}
+
+/// "23 joints", "1 body", "plane", "12 shapes".
 template <class Entry>
 std::string where_of(std::span<const Entry> list, const Model& model) {
   if constexpr (std::is_same_v<Entry, Ground>) {
     const auto& terrain = list.front().terrain;
     return terrain ? fmt::format("{} x {} heights", terrain->columns, terrain->rows) : std::string("plane");
+  } else if constexpr (std::is_same_v<Entry, PairContact>) {
+    return counted(std::ssize(list.front().shapes), "shape");
   } else if constexpr (Entry::facts.site == Site::body) {
     return counted(bodies_of(list), "body");
   } else if constexpr (requires(const Entry& entry) { entry.row; }) {
@@ -223,6 +231,10 @@ Json json_of(const Ground& g) {
   return result;
 }
 
+Json json_of(const PairContact& contact) {
+  return {{"stiffness", contact.stiffness}, {"friction", contact.friction}, {"shapes", contact.shapes.size()}, {"pairs", contact.pairs.size()}};
+}
+
 /// The joint or body that it acts on, and its values.
 template <class Entry>
 Json with_owner(const Entry& entry, const Names& names) {
@@ -261,7 +273,7 @@ Json effects_json(const Effects& effects, const Model& model) {
   Json result = Json::object();
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> list, std::string_view) {
     const std::string name(Entry::facts.name);
-    if constexpr (std::is_same_v<Entry, Ground>) {
+    if constexpr (std::is_same_v<Entry, Ground> || std::is_same_v<Entry, PairContact>) {
       if (!list.empty()) result[name] = json_of(list.front());
     } else {
       for (const Entry& entry : list) result[name].push_back(with_owner(entry, model.names));

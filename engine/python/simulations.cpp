@@ -69,9 +69,9 @@ nb::typed<nb::dict, nb::str, double> energies(PySimulation& self) {
   return shares;
 }
 
-/// A place where the ground pushes, with names.
+/// A place where the ground pushes, or a body, with names.
 struct Contact {
-  std::string body;
+  std::string body, other;
   ContactPoint point;
 };
 
@@ -79,7 +79,7 @@ std::vector<Contact> contacts(PySimulation& self) {
   std::vector<Contact> found;
   const Names& names = self.look().model().names;
   for (const ContactPoint& point : self.ask([](Simulation& simulation) { return simulation.contact_points(); }))
-    found.push_back({names.body[static_cast<std::size_t>(point.slot)], point});
+    found.push_back({names.body[static_cast<std::size_t>(point.slot)], point.other == 0 ? "" : names.body[static_cast<std::size_t>(point.other)], point});
   return found;
 }
 
@@ -176,12 +176,13 @@ void bind_joint(nb::module_& m) {
 
 void bind_contact(nb::module_& m) {
   const auto three = [](const std::array<double, 3>& numbers) { return fixed_array(std::span<const double>(numbers)); };
-  nb::class_<Contact>(m, "Contact", "Where the ground pushes a body, in the step taken last; world frame.")
-      .def_ro("body", &Contact::body, "That it pushes.")
+  nb::class_<Contact>(m, "Contact", "Where the ground pushes a body, or another body does, in the step taken last; world frame.")
+      .def_ro("body", &Contact::body, "That is pushed.")
+      .def_ro("other", &Contact::other, "Body that pushes; empty: the ground, or what is fixed to the world.")
       .def_prop_ro(
           "place", [three](const Contact& self) { return three(self.point.place); }, "Where they touch [3; m].")
       .def_prop_ro(
-          "normal", [three](const Contact& self) { return three(self.point.normal); }, "Of the ground there, of unit length [3].")
+          "normal", [three](const Contact& self) { return three(self.point.normal); }, "Of what pushes there, towards the body, of unit length [3].")
       .def_prop_ro(
           "force", [three](const Contact& self) { return three(self.point.force); },
           "On the body, friction with it, mean over the step [3; N].")
@@ -326,7 +327,7 @@ void bind_steps(nb::class_<PySimulation>& c) {
           },
           "Moves q to where all couplings are closed, as near as the mass matrix measures; velocities stay. Raises InputError where they "
           "cannot be: q is then where they are least open.")
-      .def_prop_ro("contacts", &contacts, "Every place where the ground pushes, in the step taken last; needs keep_forces before it.")
+      .def_prop_ro("contacts", &contacts, "Every place where the ground pushes, then every one where bodies push each other, in the step taken last; needs keep_forces before it.")
       .def_prop_ro(
           "joint_forces", [](PySimulation& self) { return fixed_array(self.look().joint_forces()); },
           "Generalized forces of all effects together [nv; N m, N], mean over the last step; needs keep_forces before it.")

@@ -32,6 +32,16 @@ std::vector<ContactPoint> Simulation::contact_points() const {
     points.push_back({slot, array_of(T.p + T.R * three(impulses.places, k)), array_of(three(impulses.normals, k)),
                       array_of(three(impulses.pushes, k) / options_.step)});
   }
+  for (const TouchImpulse& touch : impulses.touches) {
+    const bool on_b = touch.slot_b != 0;  // what is fixed to the world pushes, and is not pushed
+    const double sign = (on_b ? 1 : -1) / options_.step;
+    ContactPoint& point = points.emplace_back(ContactPoint{on_b ? touch.slot_b : touch.slot_a, touch.place, touch.normal, touch.impulse});
+    for (std::size_t k = 0; k < 3; ++k) {
+      point.force[k] *= sign;
+      if (!on_b) point.normal[k] = -point.normal[k];
+    }
+    point.other = on_b ? touch.slot_a : touch.slot_b;
+  }
   return points;
 }
 

@@ -21,6 +21,7 @@ std::vector<EnergyShare> energy_by_effect(Simulation& simulation) {
   });
   if (springs) shares.push_back({"springs", energy.springs});
   if (effects.ground) shares.push_back({"ground", energy.ground});
+  if (effects.contact) shares.push_back({"contact", energy.contact});
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
     if (Entry::facts.account == Account::none || entries.empty()) return;
     const std::string_view sense = Entry::facts.account == Account::taken ? "taken" : "given";

@@ -5,7 +5,7 @@
 //   shapes.distance(now, "left_hand", "torso").distance;         now: a Kinematics
 //   for (const NearPair& pair : shapes.near(now, 0.01)) ...      all that are less than a centimetre apart, and where
 //
-// Nothing of this acts on bodies: what they feel of each other is not there yet.
+// These are questions: bodies push each other where a scene says `contact` (layout/effects/contact.hpp).
 //
 // The distance of two shapes is that of their nearest points, or less than zero by the least shift that would part them; of links that of the
 // nearest pair of their shapes. Only near() leaves pairs out (models/shapes/collision_pairs.hpp): neighbours in the tree, which overlap by design,

@@ -18,6 +18,8 @@ inline constexpr CouplingKind kLastOf<CouplingKind> = static_cast<CouplingKind>(
 template <>
 inline constexpr ShapeKind kLastOf<ShapeKind> = ShapeKind::mesh;
 template <>
+inline constexpr ConvexKind kLastOf<ConvexKind> = ConvexKind::hull;
+template <>
 inline constexpr Solver kLastOf<Solver> = Solver::riqn;
 template <>
 inline constexpr FirstGuess kLastOf<FirstGuess> = FirstGuess::ig3;

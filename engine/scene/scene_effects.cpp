@@ -20,6 +20,7 @@
 #include "models/build/isometry.hpp"
 #include "models/build/vectors.hpp"
 #include "models/shapes/contacts_of.hpp"
+#include "models/shapes/pair_contact.hpp"
 
 namespace linden {
 namespace {
@@ -47,6 +48,7 @@ const std::vector<std::string> kFrames{"world", "body"};
 const std::vector<std::string> kDrag{"linear", "quadratic", "wind", "bodies"};
 const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
+const std::vector<std::string> kContact{"stiffness", "friction", "pairs", "except", "srdf"};
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
 /// By which a curve may round beyond a limit that one of its points lies on [rad, m].
@@ -332,6 +334,45 @@ class EffectsReader {
     if (ground.contacts.empty()) notes.push_back("no link that moves has a collision shape: nothing touches it");
     for (std::string& note : notes) warn(std::move(note));
     result_.effects.ground = std::move(ground);
+  }
+
+  void read(const SceneValue& at, Of<PairContact>) {
+    double stiffness = PairContact().stiffness, friction = PairContact().friction;
+    LinkPairs only, disabled;
+    if (!at.is(Kind::nothing)) {
+      at.entries_of(kContact);
+      if (const auto value = at.find("stiffness")) stiffness = value->positive();
+      if (const auto value = at.find("friction")) friction = value->not_negative();
+      if (const auto value = at.find("srdf")) disabled = value->located([&] { return srdf_disabled_pairs(scene_path(*value, folder_)); });
+      if (const auto value = at.find("except")) disabled = joined(std::move(disabled), link_pairs(*value));
+      if (const auto value = at.find("pairs")) {
+        only = link_pairs(*value);
+        if (!disabled.empty()) value->fail(value->path() + " stands beside pairs that are left out", "one of both", "leave out what does not touch from pairs");
+      }
+    }
+    std::vector<std::string> notes;
+    PairContact contact;
+    at.located([&] { contact = pair_contact_of(model_, notes, disabled, only); });
+    contact.stiffness = stiffness;
+    contact.friction = friction;
+    if (contact.pairs.empty()) notes.push_back("no two links that may touch have collision shapes: nothing touches");
+    for (std::string& note : notes) warn(std::move(note));
+    result_.effects.contact = std::move(contact);
+  }
+
+  /// [[link, link], ...]
+  static LinkPairs link_pairs(const SceneValue& at) {
+    LinkPairs pairs;
+    for (const SceneValue& item : at.list("[[link, link], ...]")) {
+      const std::vector<SceneValue> both = item.list("[link, link]");
+      if (both.size() != 2) item.fail(fmt::format("{} names {} links", item.path(), both.size()), "two", "write [link, link]");
+      pairs.emplace_back(both[0].text("a link"), both[1].text("a link"));
+    }
+    return pairs;
+  }
+  static LinkPairs joined(LinkPairs pairs, const LinkPairs& more) {
+    pairs.insert(pairs.end(), more.begin(), more.end());
+    return pairs;
   }
 
   HeightField terrain(const SceneValue& at) const {

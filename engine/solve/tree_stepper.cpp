@@ -96,7 +96,7 @@ void TreeStepper<kEffects>::keep(const State<double>& state) {
   last_good_ = state;
   if constexpr (kEffects) {
     last_memory_.clear();
-    for (const std::span<double> numbers : controls().memory()) last_memory_.insert(last_memory_.end(), numbers.begin(), numbers.end());
+    for (const std::span<double> numbers : effect_memory()) last_memory_.insert(last_memory_.end(), numbers.begin(), numbers.end());
   }
 }
 
@@ -106,7 +106,7 @@ void TreeStepper<kEffects>::restore(State<double>& state) {
   clear_account();
   if constexpr (kEffects) {
     auto next = last_memory_.begin();
-    for (const std::span<double> numbers : controls().memory()) {
+    for (const std::span<double> numbers : effect_memory()) {
       std::copy_n(next, numbers.size(), numbers.begin());
       next += static_cast<std::ptrdiff_t>(numbers.size());
     }
@@ -243,6 +243,14 @@ EffectControls TreeStepper<kEffects>::controls() {
   return {};
 }
 
+/// What effects keep from step to step, on joints, on bodies and between bodies.
+template <bool kEffects>
+std::vector<std::span<double>> TreeStepper<kEffects>::effect_memory() {
+  std::vector<std::span<double>> kept = controls().memory();
+  if (sweeps_.has_contacts()) kept.push_back(sweeps_.contact_memory());
+  return kept;
+}
+
 template <bool kEffects>
 void TreeStepper<kEffects>::clear_account() {
   account_ = {};
@@ -265,7 +273,7 @@ const StepImpulses& TreeStepper<kEffects>::impulses() const {
 
 template <bool kEffects>
 std::vector<std::span<double>> TreeStepper<kEffects>::memory() {
-  std::vector<std::span<double>> kept = controls().memory();
+  std::vector<std::span<double>> kept = effect_memory();
   if (has_stages_) kept.push_back(before_.flat());
   if (sweeps_.reuses_factor()) {
     kept.push_back(solve_.held().numbers());
@@ -354,6 +362,11 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
       effects_.end_joints(work_.delta, work_.motion, Stopped::struck, sweeps_.joint_residual(), work_.end_impulse);
     }
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
+    sweeps_.end_contacts(h, before_, [&](Index slot, double taken) {
+      part.work.of<PairContact>() += taken;
+      part.least[kListOf<PairContact>].see(slot, taken);
+    });
+    if (impulses_.kept()) sweeps_.account_for_contacts(h, impulses_);
   }
   if (sweeps_.gives_way()) account_.work.couplings += sweeps_.end_couplings(h);
   history = std::min(history + 1, kHistory);
@@ -376,7 +389,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   fold_mimics(sweeps_.mimics(), state.p);
   if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
   if constexpr (kEffects) {
-    sweeps_.end_reading(before_, known);
+    sweeps_.end_reading(h, before_, known);
     if (strike(state, h, true, report)) history = 1;
   }
 }
@@ -384,6 +397,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
 template <bool kEffects>
 void TreeStepper<kEffects>::forget() {
   solve_.held() = {};
+  sweeps_.forget_contacts();
   if constexpr (kEffects) effects_.forget();
 }
 
@@ -408,8 +422,8 @@ Energy TreeStepper<kEffects>::energy_of(const State<double>& state, Field<double
   for (Index row = 0; row < rate.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
   within_bend(state, rate);
   if constexpr (kEffects) {
-    const double ground = effects_.ground_potential();
-    return {kinetic, sweeps_.potential(), sweeps_.effect_potential() - ground, ground};
+    const double ground = effects_.ground_potential(), contact = sweeps_.contact_potential();
+    return {kinetic, sweeps_.potential(), sweeps_.effect_potential() - ground - contact, ground, contact};
   }
   return {kinetic, sweeps_.potential(), sweeps_.effect_potential()};
 }

@@ -78,6 +78,7 @@ class TreeStepper final : public Stepper {
     requires kEffects;
   bool strike(State<double>& state, double h, bool arrived, StepReport& report)
     requires kEffects;
+  std::vector<std::span<double>> effect_memory();
   void clear_account();
   void keep(const State<double>& state);
   void restore(State<double>& state);

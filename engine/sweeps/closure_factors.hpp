@@ -39,7 +39,7 @@ class ClosureFactors {
     right_sides_.resize(most, Pack(0.0));
     rho_.assign(rows.count(), S(0.0));
     for (std::vector<S>* each : {&across_, &columns_}) each->assign(paths().numbers(), S(0.0));
-    for (const Closure& closure : closures()) factors_.emplace_back(closure.rows.size());
+    for (const Closure& closure : closures()) factors_.emplace_back(closure.rows.size(), closure.touches);
   }
 
   /// Once joints beyond the body where it closes have been taken out, with these gains; ties: factored. jacobian: J of rows; here and arrives: how
@@ -62,8 +62,10 @@ class ClosureFactors {
   /// Of each row: before the first half of a solve -g, or whatever it is to open by.
   std::vector<S>& rho() { return rho_; }
   /// In the first half of a solve, whose innovation, u of r, is that of the bodies beyond: rho, and of the bias, what was passed up to bodies, that
-  /// of the body where it closes.
-  void yield(std::size_t closure, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
+  /// of the body where it closes. touch(rows, S, right side): where contacts are among its rows, whether it has turned the right side into what
+  /// fulfils their laws.
+  template <class Touch>
+  void yield(std::size_t closure, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias, const Touch& touch) {
     const Closure& closes = closures()[closure];
     ClosureFactor& kept = factors_[closure];
     if (closure == 0) ties_.move(paths().reached(), ties, [&](Index v, std::size_t) { return innovation(v); });
@@ -83,7 +85,7 @@ class ClosureFactors {
         });
       }
     }
-    solve(closure, kept.right_side.data());
+    if (!closes.touches || !touch(closes.rows, kept.product, kept.right_side)) solve(closure, kept.right_side.data());
     for (std::size_t k = 0; k < closes.rows.size(); ++k) rho_[closes.rows[k]] = kept.right_side[k];
     if (closes.slot == 0) return;
     for (int c = 0; c < 6; ++c) {
@@ -155,12 +157,14 @@ class ClosureFactors {
 
   /// Of the rows that close together.
   struct ClosureFactor {
-    explicit ClosureFactor(std::size_t rows)
-        : solve(rows), fresh(rows), moved_by_itself(rows, S(0.0)), up(kSix * rows, S(0.0)), down(kSix * rows, S(0.0)), right_side(rows, S(0.0)) {}
+    ClosureFactor(std::size_t rows, bool touches)
+        : solve(rows), fresh(rows), moved_by_itself(rows, S(0.0)), up(kSix * rows, S(0.0)), down(kSix * rows, S(0.0)), right_side(rows, S(0.0)),
+          product(touches ? rows * rows : 0, S(0.0)) {}
     MaskedSolve<S> solve, fresh;
     std::vector<S> moved_by_itself;  // diagonal of S, scaled
     std::vector<S> up, down;         // b of each column, S^-1 y^T
     std::vector<S> right_side;       // scratch
+    std::vector<S> product;          // S, where contacts are among the rows
   };
 
   const CouplingPaths& paths() const { return rows_.paths(); }
@@ -331,7 +335,10 @@ class ClosureFactors {
             const std::size_t row = path.first_row + j;
             each_row_of(other, first, sums[j], [&](std::size_t c, const S& product) {
               const std::size_t column = other.first_row + c;
-              kept.fresh.at(path.first_in_closure + j, other.first_in_closure + c) = scale[row] * (scale[column] * (product + ties_.product(row, column)));
+              const S whole = product + ties_.product(row, column);
+              const std::size_t at_row = path.first_in_closure + j, at_column = other.first_in_closure + c;
+              kept.fresh.at(at_row, at_column) = scale[row] * (scale[column] * whole);
+              if (closes.touches) kept.product[at_row * closes.rows.size() + at_column] = whole;
             });
           }
         }

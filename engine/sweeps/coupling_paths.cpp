@@ -252,25 +252,20 @@ class Sets {
 
 }  // namespace
 
-CouplingPaths::CouplingPaths(const Model& model, Closing closing, std::size_t side_by_side) {
+CouplingPaths::CouplingPaths(const Model& model, Closing closing, std::size_t side_by_side, std::span<const Coupling> contacts) {
   const bool at_world = closing == Closing::at_world || !model.mimics.empty();
+  for (const Coupling& coupling : model.couplings) add(model, coupling, at_world, side_by_side);
+  lasting_rows_ = rows();
+  for (const Coupling& contact : contacts) add(model, contact, true, side_by_side);
   std::set<Index, std::greater<>> reached;
   const auto reach = [&](Index slot) {
     for (; slot != 0 && reached.insert(slot).second; slot = model.tree.parent(slot)) {
     }
   };
-  std::size_t row = 0;
-  for (const Coupling& coupling : model.couplings) {
-    CouplingPath& path = paths_.emplace_back(PathMaker(model, coupling, at_world).make());
-    path.first_row = row;
-    path.last_row = row += rows_of(coupling).size();
-    path.room = (path.rows() + side_by_side - 1) / side_by_side * side_by_side;
-    path.first_velocity = velocities_;
-    velocities_ += path.room * path.velocities;
-    for (const GapRow& kind : rows_of(coupling)) rigid_.push_back(compliance_of(coupling, kind).gives_way() ? 0 : 1);
+  for (const CouplingPath& path : paths_) {
     for (const CouplingPath::Joint& joint : path.joints) reach(joint.slot);
   }
-  if (!model.couplings.empty()) {
+  if (!empty()) {
     for (const Mimic& mimic : model.mimics) {
       reach(mimic.leader_slot);
       reach(mimic.follower_slot);
@@ -278,6 +273,17 @@ CouplingPaths::CouplingPaths(const Model& model, Closing closing, std::size_t si
   }
   reached_.assign(reached.begin(), reached.end());
   close(model);
+}
+
+void CouplingPaths::add(const Model& model, const Coupling& coupling, bool at_world, std::size_t side_by_side) {
+  const std::size_t row = rows();
+  CouplingPath& path = paths_.emplace_back(PathMaker(model, coupling, at_world).make());
+  path.first_row = row;
+  path.last_row = row + rows_of(coupling).size();
+  path.room = (path.rows() + side_by_side - 1) / side_by_side * side_by_side;
+  path.first_velocity = velocities_;
+  velocities_ += path.room * path.velocities;
+  for (const GapRow& kind : rows_of(coupling)) rigid_.push_back(is_contact(coupling.kind) || compliance_of(coupling, kind).gives_way() ? 0 : 1);
 }
 
 /// Closures, and what each path passes and meets.
@@ -297,7 +303,7 @@ void CouplingPaths::close(const Model& model) {
   std::vector<std::size_t> number_of(paths_.size());  // of the closure that a leader's set is
   for (const std::size_t leader : leaders) {
     number_of[leader] = closures_.size();
-    closures_.push_back({paths_[leader].closes_at, {}, {}});
+    closures_.push_back({paths_[leader].closes_at, {}, {}, false});
   }
   std::map<Index, std::vector<std::size_t>> closures_through;  // joint -> closures with a path through it
   for (std::size_t k = 0; k < paths_.size(); ++k) {
@@ -305,6 +311,7 @@ void CouplingPaths::close(const Model& model) {
     paths_[k].closure = number;
     paths_[k].first_in_closure = closures_[number].rows.size();
     closures_[number].paths.push_back(k);
+    closures_[number].touches = closures_[number].touches || is_contact(paths_[k].coupling->kind);
     for (std::size_t row = paths_[k].first_row; row < paths_[k].last_row; ++row) closures_[number].rows.push_back(row);
     for (const CouplingPath::Joint& joint : paths_[k].joints) {
       std::vector<std::size_t>& through = closures_through[joint.slot];

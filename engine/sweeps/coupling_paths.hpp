@@ -78,6 +78,7 @@ struct Closure {
   Index slot;                      // of the body, 0: the world
   std::vector<std::size_t> paths;
   std::vector<std::size_t> rows;   // of all rows, path by path
+  bool touches = false;            // some are of a contact
 };
 
 /// Where couplings close.
@@ -88,8 +89,8 @@ enum class Closing : std::uint8_t {
 
 class CouplingPaths {
  public:
-  /// side_by_side: rows of a coupling in a register.
-  CouplingPaths(const Model& model, Closing closing, std::size_t side_by_side);
+  /// side_by_side: rows of a coupling in a register. contacts: further couplings, which close at the world; must outlive it.
+  CouplingPaths(const Model& model, Closing closing, std::size_t side_by_side, std::span<const Coupling> contacts = {});
   // not inline: those that use it are compiled for one processor each
   ~CouplingPaths();
   CouplingPaths(const CouplingPaths&) = delete;
@@ -102,6 +103,8 @@ class CouplingPaths {
   std::size_t rows() const { return empty() ? 0 : paths_.back().last_row; }
   /// That a row of all of them belongs to.
   const CouplingPath& path_of(std::size_t row) const;
+  /// Of those that are no contacts: they come first.
+  std::size_t lasting_rows() const { return lasting_rows_; }
   /// Whether a row of all of them does not give way.
   bool is_rigid(std::size_t row) const { return rigid_[row] != 0; }
   /// What is kept for each velocity of a path and row; for each number and row.
@@ -111,13 +114,14 @@ class CouplingPaths {
   std::span<const Index> reached() const { return reached_; }
 
  private:
+  void add(const Model& model, const Coupling& coupling, bool at_world, std::size_t side_by_side);
   void close(const Model& model);
 
   std::vector<CouplingPath> paths_;
   std::vector<Closure> closures_;
   std::vector<Index> reached_;
   std::vector<char> rigid_;  // of each row
-  std::size_t velocities_ = 0, numbers_ = 0;
+  std::size_t velocities_ = 0, numbers_ = 0, lasting_rows_ = 0;
 };
 
 }  // namespace linden

@@ -32,7 +32,9 @@ enum class Asked : std::uint8_t { gaps, rows };
 template <class S, class Side = RowLanes<S, RowPack<S>>>
 class CouplingRows {
  public:
-  CouplingRows(const Model& model, Closing closing) : model_(model), paths_(model, closing, Side::count) {
+  /// contacts: see CouplingPaths.
+  CouplingRows(const Model& model, Closing closing, std::span<const Coupling> contacts = {})
+      : model_(model), paths_(model, closing, Side::count, contacts) {
     if (empty()) return;
     std::size_t longest = 0;
     for (const CouplingPath& path : paths_.all()) longest = std::max(longest, path.joints.size());
@@ -186,17 +188,26 @@ class CouplingRows {
       const Placement<S> A = placed_in(pose(path.ends[0].at), placement_of(coupling.frame_a)), B = placed_in(pose(path.ends[1].at), placement_of(coupling.frame_b));
       const std::span<const GapRow> kinds = rows_of(coupling);
       std::array<Gap<S>, 6> gaps;
+      std::array<Vec3<S>, 6> at;  // where forces act
       for (std::size_t j = 0; j < kinds.size(); ++j) {
         gaps[j] = gap_of(kinds[j], coupling.length, A, B);
-        gap_[path.first_row + j] = gaps[j].gap;
+        at[j] = B.p;
       }
+      if (is_contact(coupling.kind)) {
+        const auto behind = [](const Placement<S>& frame, double depth) { return Placement<S>{frame.R, frame.p + as<S>(depth) * axis_of(frame.R, 2)}; };
+        const Placement<S> middle = behind(B, coupling.rounding[1]);
+        gaps[2] = gap_of(kinds[2], 0, behind(A, -coupling.rounding[0]), middle);
+        gaps[2].gap = gaps[2].gap - as<S>(coupling.rounding[0] + coupling.rounding[1]);
+        at[2] = middle.p;
+      }
+      for (std::size_t j = 0; j < kinds.size(); ++j) gap_[path.first_row + j] = gaps[j].gap;
       for (std::size_t k = 0; numbers && k < path.joints.size(); ++k) {
         const CouplingPath::Joint& on = path.joints[k];
         if (on.sign == 0) continue;
         with_joint(model_.tree.kind(on.slot), [&](auto joint) {
           for (std::size_t j = 0; j < kinds.size(); ++j) {
             S along[6];
-            gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), B.p, gaps[j], as<S>(on.sign), along);
+            gap_along(joint, model_.constants, on.slot, pose(static_cast<Index>(k)), at[j], gaps[j], as<S>(on.sign), along);
             S* const to = &(*numbers)[path.first_velocity + static_cast<std::size_t>(on.at) * path.room + j];
             for (std::size_t n = 0; n < static_cast<std::size_t>(velocity_count(joint)); ++n) to[n * path.room] = along[n];
           }
@@ -204,7 +215,7 @@ class CouplingRows {
       }
       for (std::size_t j = 0; scales && j < kinds.size(); ++j) {
         S moves(0.0);
-        for (const CouplingPath::End& end : path.ends) moves = moves + moved(end, gaps[j], B.p);
+        for (const CouplingPath::End& end : path.ends) moves = moves + moved(end, gaps[j], at[j]);
         scale_[path.first_row + j] = S(1.0) / sqrt(moves);
         if (kinds[j].kind == GapKind::angle) steepness_[path.first_row + j] = dot(gaps[j].couple, gaps[j].couple);
       }

@@ -34,8 +34,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -43,6 +45,7 @@
 #include "engine/sweeps/coupling_rows.hpp"
 #include "engine/sweeps/coupling_springs.hpp"
 #include "kernels/block/evaluate_down.hpp"
+#include "kernels/couplings/contact_solve.hpp"
 #include "kernels/tree/mimic.hpp"
 #include "kernels/values/lanes_of.hpp"
 #include "layout/model.hpp"
@@ -60,9 +63,11 @@ class CouplingSweeps {
   using Mask = typename LanesOf<S>::Mask;
   using Side = RowLanes<S, Pack>;
 
-  /// yields: of each row (coupling_yields.hpp); empty where none gives way.
-  CouplingSweeps(const Model& model, std::span<const double> yields, Serves serves = Serves::till_the_next, Closing closing = Closing::nearest)
-      : model_(model), rows_(model, closing), of_step_(model, rows_) {
+  /// yields: of each row (coupling_yields.hpp); empty where none gives way. contacts: beside the couplings of the model (layout/couplings.hpp); what
+  /// they are made of must outlive it, and may change from step to step. Not where factors outlast steps.
+  CouplingSweeps(const Model& model, std::span<const double> yields, Serves serves = Serves::till_the_next, Closing closing = Closing::nearest,
+                 std::span<const Coupling> contacts = {})
+      : model_(model), rows_(model, closing, contacts), of_step_(model, rows_), laws_(contacts.size()) {
     if (serves == Serves::steps_that_follow && !empty()) {
       of_others_.emplace(model, rows_);
       history_.allocate(static_cast<Index>(rows()), S(0.0));
@@ -77,6 +82,7 @@ class CouplingSweeps {
       }
     }
     if (gives_way()) ends_.allocate(model.tree.shape.velocities, S(0.0));
+    if (!contacts.empty()) guess_.assign(rows(), S(0.0));
   }
 
   CouplingSweeps(const CouplingSweeps&) = delete;
@@ -165,7 +171,8 @@ class CouplingSweeps {
     const auto at_end = [&](auto joint, Index i) { return after_motion(joint, load<Placement, S>(placement, i), load_motion(joint, *motion, i)); };
     const auto added = [&](std::size_t row) {
       const S& scale = rows_.scales()[row];
-      return is_rigid(row) ? as<S>(damping) : as<S>(damping) + scale * scale * as<S>(springs_.yield(of, row));
+      if (is_rigid(row)) return as<S>(damping);
+      return touches(row) ? as<S>(kInfinite) : as<S>(damping) + scale * scale * as<S>(springs_.yield(of, row));
     };
     const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
     ClosureFactors<S, Pack>& factors = factors_of(of);
@@ -192,7 +199,12 @@ class CouplingSweeps {
   /// Within up_to_closures of the first half of a solve, whose innovation, u of r, is that of the bodies beyond: of the bias, what was passed up
   /// to bodies, that of the body where it closes.
   void yield(std::size_t closure, Coupled of, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
-    factors_of(of).yield(closure, ties, innovation, bias);
+    factors_of(of).yield(closure, ties, innovation, bias, [&](const auto& rows, const auto& product, auto& right_side) {
+      if constexpr (std::is_same_v<S, double>) {
+        if (of == Coupled::step) touch(rows, product, right_side);
+      }
+      return std::is_same_v<S, double> && of == Coupled::step;
+    });
   }
   /// Within down_from_closures of the second half of a solve, where it is known how the body where it closes moves: the innovation of joints
   /// beyond becomes that of r - G^T dlambda.
@@ -238,6 +250,33 @@ class CouplingSweeps {
       rows_.each_on_path(path, [&](Index v, std::size_t) { target(v) = unpushed_(v); });
     }
     rows_.push(lambda_, rows_.at_begin(), target, plus);
+  }
+
+  std::size_t contacts() const { return laws_.size(); }
+  /// After begin: the law of a contact in this step, and the impulse along its rows that is to be expected.
+  void set_contact(std::size_t contact, const ContactLaw& law, const std::array<double, 3>& guess) {
+    laws_[contact] = law;
+    for (std::size_t j = 0; j < 3; ++j) guess_[first_of(contact) + j] = as<S>(guess[j]);
+  }
+  /// Of the step solved last: the impulse along each of its rows, times h; how far each opens at its beginning in the mean of it and of the step
+  /// before, of these displacements: what an impulse between the two works along. Before bodies are placed at its end.
+  std::array<S, 3> impulse_of(std::size_t contact) const {
+    const std::size_t row = first_of(contact);
+    return {lambda_[row] + increment_[row], lambda_[row + 1] + increment_[row + 1], lambda_[row + 2] + increment_[row + 2]};
+  }
+  std::array<S, 3> opens(std::size_t contact, const Field<S>& before, const Field<S>& now) const {
+    std::array<S, 3> mean;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const std::size_t row = first_of(contact) + j;
+      mean[j] = S(0.5) * (opening(row, before) + opening(row, now));
+    }
+    return mean;
+  }
+  /// to += share of what contacts pushed, with bodies where they are.
+  void add_contacts(double share, Field<S>& to) {
+    std::ranges::fill(pull_, S(0.0));
+    for (std::size_t row = rows_.paths().lasting_rows(); row < rows(); ++row) pull_[row] = as<S>(share) * (lambda_[row] + increment_[row]);
+    rows_.push(pull_, rows_.at_begin(), to, plus);
   }
 
   /// After the last evaluation of a step of h, before bodies are placed at its end: what rows that give way push there. Returns what they took [J].
@@ -287,7 +326,9 @@ class CouplingSweeps {
     of_step_.each_row([&](std::size_t row, const S& inverse, const S& moved_by_itself) {
       const S& scale = rows_.scales()[row];
       const S size = scale * rows_.sizes()[row], pushed = (lambda_[row] + increment_[row]) / scale;
-      sum = sum + size * size * abs(inverse) + pushed * pushed * abs(moved_by_itself);
+      S holds = abs(inverse);
+      if (touches(row)) holds = select(pushed == S(0.0), S(0.0), S(1.0) / abs(moved_by_itself));  // what sticks, or is pressed, all but holds
+      sum = sum + size * size * holds + pushed * pushed * abs(moved_by_itself);
     });
     return sum;
   }
@@ -333,6 +374,31 @@ class CouplingSweeps {
   static constexpr auto plus = [](const S& now, const S& pushed) { return now + pushed; };
   static constexpr auto minus = [](const S& now, const S& pushed) { return now - pushed; };
 
+  static constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+  bool touches(std::size_t row) const { return row >= rows_.paths().lasting_rows(); }
+  std::size_t first_of(std::size_t contact) const { return rows_.paths().lasting_rows() + 3 * contact; }
+  /// Changes of multipliers with which contacts among these rows fulfil their laws, and the others open by what they are to.
+  void touch(const std::vector<std::size_t>& rows, const std::vector<S>& product, std::vector<S>& right_side) {
+    for (std::vector<S>* numbers : {&yields_, &multipliers_, &changes_}) numbers->assign(rows.size(), S(0.0));
+    firsts_.clear();
+    laws_there_.clear();
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const std::size_t row = rows[k];
+      multipliers_[k] = lambda_[row];
+      if (!touches(row)) {
+        yields_[k] = is_rigid(row) ? (of_step_.inverse(row) == S(0.0) ? S(kInfinite) : S(0.0)) : S(springs_.yield(Coupled::step, row));
+        continue;
+      }
+      changes_[k] = guess_[row] - lambda_[row];
+      if ((row - rows_.paths().lasting_rows()) % 3 != 0) continue;
+      firsts_.push_back(k);
+      laws_there_.push_back(laws_[(row - rows_.paths().lasting_rows()) / 3]);
+    }
+    contact_solve_.solve({product, yields_, firsts_, laws_there_, multipliers_, changes_}, right_side);
+    for (std::size_t k = 0; k < rows.size(); ++k) guess_[rows[k]] = lambda_[rows[k]] + right_side[k];
+  }
+
   void keep_rows(const CouplingPath& path) {
     const auto first = static_cast<std::ptrdiff_t>(path.first_velocity);
     std::copy_n(rows_.at_begin().begin() + first, path.room * path.velocities, factored_.begin() + first);
@@ -347,6 +413,12 @@ class CouplingSweeps {
   std::optional<ClosureFactors<S, Pack>> of_others_;     // velocities and positions; none: the same serves for all
   const ClosureFactors<S, Pack>* made_last_ = &of_step_;
   CouplingSprings<S> springs_;
+  std::vector<ContactLaw> laws_;          // of each contact
+  std::vector<S> guess_;                  // of each row, the multiplier that a solve begins with
+  ContactSolve contact_solve_;
+  std::vector<S> yields_, multipliers_, changes_;  // scratch: of the rows that close together
+  std::vector<std::size_t> firsts_;                // likewise
+  std::vector<ContactLaw> laws_there_;             // likewise
   std::vector<S> factored_;     // G that the factor of a step was made with, where it outlasts that
   Field<S, kHistory> history_;  // multipliers of the last steps, latest first; empty where no factor outlasts one
   std::vector<S> lambda_;

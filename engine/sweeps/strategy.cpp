@@ -26,7 +26,7 @@ bool is_long_chain(const Tree& tree) {
 Strategy strategy_of(const Model& model, const Options& options, const EffectPlan& plan) {
   Strategy strategy;
   strategy.gravity = options.gravity != std::array<double, 3>{0, 0, 0};
-  strategy.one_pass = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && model.couplings.empty();
+  strategy.one_pass = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && model.couplings.empty() && !plan.pairs;
   strategy.reuses_factor = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && options.order == 2 &&
                            options.guess == FirstGuess::extrapolation && !plan.has_states;
   if (plan.any() || !strategy.one_pass) return strategy;

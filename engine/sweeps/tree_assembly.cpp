@@ -21,10 +21,10 @@ constexpr double kClosed = 1e-13, kNearEnough = 1e-9;
 template <bool kEffects>
 Assembly TreeSweeps<kEffects>::openness() {
   Assembly worst;
-  for (std::size_t row = 0; row < couplings_.rows(); ++row) {
-    if (!couplings_.is_rigid(row)) continue;
-    const double gap = std::abs(couplings_.gap(row)), relative = gap / couplings_.size(row);
-    if (relative > worst.relative || worst.coupling.empty()) worst = {couplings_.coupling_of(row).name, gap, relative, true};
+  for (std::size_t row = 0; row < couplings_->rows(); ++row) {
+    if (!couplings_->is_rigid(row)) continue;
+    const double gap = std::abs(couplings_->gap(row)), relative = gap / couplings_->size(row);
+    if (relative > worst.relative || worst.coupling.empty()) worst = {couplings_->coupling_of(row).name, gap, relative, true};
   }
   if (worst.relative > kNearEnough) {
     factor_for_start(Coupled::positions);
@@ -53,8 +53,8 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::measure_cables(Field<double>& q) {
   bool moved = false;
   each_cable([&](std::size_t row, const GearTerm& length) {
-    moved = moved || couplings_.gap(row) != 0;
-    q(length.q_row) += couplings_.gap(row);
+    moved = moved || couplings_->gap(row) != 0;
+    q(length.q_row) += couplings_->gap(row);
   });
   if (moved) refresh(q);
 }
@@ -63,20 +63,20 @@ template <bool kEffects>
 Index TreeSweeps<kEffects>::widest_coupling() const {
   std::size_t row = 0;
   double widest = -1;
-  for (std::size_t k = 0; k < couplings_.rows(); ++k) {
-    const double open = std::abs(couplings_.gap(k)) / couplings_.size(k);
-    if (!couplings_.is_rigid(k) || open <= widest) continue;
+  for (std::size_t k = 0; k < couplings_->rows(); ++k) {
+    const double open = std::abs(couplings_->gap(k)) / couplings_->size(k);
+    if (!couplings_->is_rigid(k) || open <= widest) continue;
     widest = open;
     row = k;
   }
-  return static_cast<Index>(&couplings_.coupling_of(row) - model_.couplings.data());
+  return static_cast<Index>(&couplings_->coupling_of(row) - model_.couplings.data());
 }
 
 /// Whether all rows are, but for those that others hold by the factor made last.
 template <bool kEffects>
 bool TreeSweeps<kEffects>::is_closed_to(double enough) const {
-  for (std::size_t row = 0; row < couplings_.rows(); ++row) {
-    if (couplings_.is_rigid(row) && std::abs(couplings_.gap(row)) / couplings_.size(row) > (couplings_.is_held_already(row) ? kMostOpen : enough)) return false;
+  for (std::size_t row = 0; row < couplings_->rows(); ++row) {
+    if (couplings_->is_rigid(row) && std::abs(couplings_->gap(row)) / couplings_->size(row) > (couplings_->is_held_already(row) ? kMostOpen : enough)) return false;
   }
   return true;
 }
@@ -84,8 +84,8 @@ bool TreeSweeps<kEffects>::is_closed_to(double enough) const {
 /// v <- v - M^-1 G^T (G M^-1 G^T)^-1 G v.
 template <bool kEffects>
 void TreeSweeps<kEffects>::close_velocities(Field<double>& v) {
-  if (couplings_.empty()) return;
-  each_cable([&](std::size_t row, const GearTerm& length) { v(length.v_row) += couplings_.opening(row, v); });
+  if (couplings_->empty()) return;
+  each_cable([&](std::size_t row, const GearTerm& length) { v(length.v_row) += couplings_->opening(row, v); });
   factor_for_start(Coupled::velocities);
   std::ranges::fill(work_.residual.flat(), 0.0);
   apply_mass_inverse(work_.residual, work_.increment, &v);
@@ -122,15 +122,15 @@ void TreeSweeps<kEffects>::displace(Field<double>& q) {
 /// is least open.
 template <bool kEffects>
 Assembly TreeSweeps<kEffects>::assemble(Field<double>& q) {
-  double damping = 0, open = couplings_.openness();
-  couplings_.keep_scales(true);
+  double damping = 0, open = couplings_->openness();
+  couplings_->keep_scales(true);
   Field<double> good;
   good.allocate(q.rows());
   for (int k = 0; k < kMostCorrections && widest_gap() > kClosed; ++k) {
     std::ranges::copy(q.flat(), good.flat().begin());
     close_gaps(damping, q);
     if (damping == 0 && is_closed_to(kClosed)) break;
-    const double now = couplings_.openness();
+    const double now = couplings_->openness();
     if (now < open) {
       const bool stalls = now > (1 - 1e-12) * open;
       open = now;
@@ -143,7 +143,7 @@ Assembly TreeSweeps<kEffects>::assemble(Field<double>& q) {
       damping = std::max(1e-4, 10 * damping);
     }
   }
-  couplings_.keep_scales(false);
+  couplings_->keep_scales(false);
   return openness();
 }
 

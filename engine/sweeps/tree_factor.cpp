@@ -32,8 +32,8 @@ template <bool kEffects>
 void TreeSweeps<kEffects>::close(std::size_t closure, Coupled of, const Gains<double>& gains, double damping) {
   const bool increments = of == Coupled::step && options_.solver == Solver::newton;
   const std::array<double, 36> felt =
-      couplings_.close(closure, of, *constants_, work_.placement, increments ? &work_.motion : nullptr, gains, ties_, true, damping);
-  const Index slot = couplings_.slot_of(closure);
+      couplings_->close(closure, of, *constants_, work_.placement, increments ? &work_.motion : nullptr, gains, ties_, true, damping);
+  const Index slot = couplings_->slot_of(closure);
   if (slot == 0) return;
   if (increments) {
     add_inertia(model_.tree, all_slots(model_.tree), slot, felt, work_.articulated);
@@ -56,23 +56,23 @@ void TreeSweeps<kEffects>::factor() {
     });
     tie(gains(), [&](Field<double>& x) { increments_down(part, x); });
   };
-  couplings_.up_to_closures(part_up, [&](std::size_t closure) { close(closure, Coupled::step, gains()); });
+  couplings_->up_to_closures(part_up, [&](std::size_t closure) { close(closure, Coupled::step, gains()); });
 }
 
 template <bool kEffects>
 double TreeSweeps<kEffects>::pass_residual() {
-  couplings_.begin_solve(Coupled::step);
+  couplings_->begin_solve(Coupled::step);
   double norm = 0;
-  couplings_.up_to_closures(
+  couplings_->up_to_closures(
       [&](Slots part) { norm += impulse_pass_up(model_.tree, *constants_, work_.placement, gains(), work_.residual, part, work_.bias, work_.innovation); },
-      [&](std::size_t closure) { couplings_.yield(closure, Coupled::step, ties_, work_.innovation, work_.bias); });
+      [&](std::size_t closure) { couplings_->yield(closure, Coupled::step, ties_, work_.innovation, work_.bias); });
   if (!solves_with_residual()) return norm;
   pass_down(work_.increment);
-  if (!couplings_.empty()) {
-    couplings_.subtract_push(work_.residual);
+  if (!couplings_->empty()) {
+    couplings_->subtract_push(work_.residual);
     fold_mimics(ties_.mimics(), work_.residual);
   }
-  return std::abs(along(work_.increment) - couplings_.beyond_norm(work_.increment));
+  return std::abs(along(work_.increment) - couplings_->beyond_norm(work_.increment));
 }
 
 template <bool kEffects>
@@ -86,8 +86,8 @@ void TreeSweeps<kEffects>::increments_down(Slots part, Field<double>& x) {
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::pass_down(Field<double>& correction) {
-  couplings_.down_from_closures([&](Slots part) { increments_down(part, correction); },
-                                [&](std::size_t closure) { couplings_.push(closure, Coupled::step, work_.variation, work_.innovation); });
+  couplings_->down_from_closures([&](Slots part) { increments_down(part, correction); },
+                                [&](std::size_t closure) { couplings_->push(closure, Coupled::step, work_.variation, work_.innovation); });
   if (!ties_.empty()) ties_.complete(correction);
 }
 
@@ -101,7 +101,7 @@ void TreeSweeps<kEffects>::factor_mass(const Added& added, Coupled of, double da
     });
     tie(mass_gains(), [&](Field<double>& x) { rates_down(part, x); });
   };
-  couplings_.up_to_closures(part_up, [&](std::size_t closure) { close(closure, of, mass_gains(), damping); });
+  couplings_->up_to_closures(part_up, [&](std::size_t closure) { close(closure, of, mass_gains(), damping); });
 }
 
 /// Of positions or velocities that are to close couplings; joints whose motion is given keep theirs.
@@ -123,12 +123,12 @@ void TreeSweeps<kEffects>::rates_down(Slots part, Field<double>& v) {
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::apply_mass_inverse(const Field<double>& p, Field<double>& v, const Field<double>* given, Coupled of) {
-  couplings_.begin_solve(of, given);
-  couplings_.up_to_closures(
+  couplings_->begin_solve(of, given);
+  couplings_->up_to_closures(
       [&](Slots part) { impulse_pass_up(model_.tree, *constants_, work_.placement, mass_gains(), p, part, work_.bias, work_.innovation); },
-      [&](std::size_t closure) { couplings_.yield(closure, of, ties_, work_.innovation, work_.bias); });
-  couplings_.down_from_closures([&](Slots part) { rates_down(part, v); },
-                                [&](std::size_t closure) { couplings_.push(closure, of, work_.variation, work_.innovation); });
+      [&](std::size_t closure) { couplings_->yield(closure, of, ties_, work_.innovation, work_.bias); });
+  couplings_->down_from_closures([&](Slots part) { rates_down(part, v); },
+                                [&](std::size_t closure) { couplings_->push(closure, of, work_.variation, work_.innovation); });
   if (!ties_.empty()) ties_.complete(v);
 }
 
@@ -148,8 +148,8 @@ void TreeSweeps<kEffects>::blow(Field<double>& change, Field<double>& impulse) {
     apply_mass_inverse(impulse, work_.increment, &change);
     for (Index row = 0; row < change.rows(); ++row) change(row) += work_.increment(row);
     momentum_of(change, impulse);
-    if (!couplings_.empty()) {
-      couplings_.add_pull(impulse);
+    if (!couplings_->empty()) {
+      couplings_->add_pull(impulse);
       fold_mimics(ties_.mimics(), impulse);
     }
   }
@@ -167,13 +167,13 @@ void TreeSweeps<kEffects>::momentum_of(const Field<double>& v, Field<double>& p)
 
 template <bool kEffects>
 const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p, Field<double>& v) {
-  if (!kEffects && !couplings_.gives_way()) {
+  if (!kEffects && !couplings_->gives_way()) {
     velocity_of(p, v);
     return p;
   }
   read_ = p;
   if constexpr (kEffects) effects_.begin_reading(read_);
-  couplings_.begin_reading(options_.step, read_);
+  couplings_->begin_reading(options_.step, read_);
   fold_mimics(ties_.mimics(), read_);
   const bool given = given_.rows() > 0;
   if constexpr (kEffects) {
@@ -189,7 +189,7 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
   }
   apply_mass_inverse(read_, v, given ? &given_ : nullptr, Coupled::reading);
   for (Index row = 0; given && row < v.rows(); ++row) v(row) += given_(row);
-  if (given || couplings_.gives_way()) momentum_of(v, read_);
+  if (given || couplings_->gives_way()) momentum_of(v, read_);
   return read_;
 }
 
@@ -200,9 +200,9 @@ std::vector<CouplingState> TreeSweeps<kEffects>::couplings(double h) const {
     CouplingState& state = states.emplace_back();
     state.name = coupling.name;
     for (const std::size_t end = row + rows_of(coupling).size(); row < end; ++row) {
-      state.gaps.push_back(couplings_.gap(row));
-      state.forces.push_back(h != 0 ? couplings_.multiplier(row) / (h * h) : 0);
-      state.redundant.push_back(couplings_.is_held_already(row));
+      state.gaps.push_back(couplings_->gap(row));
+      state.forces.push_back(h != 0 ? couplings_->multiplier(row) / (h * h) : 0);
+      state.redundant.push_back(couplings_->is_held_already(row));
     }
   }
   return states;

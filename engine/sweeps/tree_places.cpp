@@ -31,13 +31,29 @@ void TreeSweeps<kEffects>::place_again(Slots part) {
 
 template <bool kEffects>
 void TreeSweeps<kEffects>::find_potentials(const Field<double>& q) {
-  couplings_.place(work_.placement, q);
+  couplings_->place(work_.placement, q);
   if (strategy_.gravity) potential_ = gravity_potential(work_.field, work_.first_moment);
-  if (kEffects || couplings_.gives_way()) {
-    effect_potential_ = couplings_.potential();
+  if (kEffects || couplings_->gives_way()) {
+    effect_potential_ = couplings_->potential();
     if constexpr (kEffects) effect_potential_ += effects_.refresh(work_.placement, q);
+    effect_potential_ += contact_potential();
     potential_ = (strategy_.gravity ? potential_ : 0) + effect_potential_;
   }
+}
+
+/// Which bodies are near each other where they are, as rows of couplings. What is told of the last step stays until the next begins.
+template <bool kEffects>
+void TreeSweeps<kEffects>::couple_contacts() {
+  if (!contacts_) return;
+  world_placement_down(model_.tree, work_.placement, pose_);
+  if (contacts_->find(pose_)) couplings_.emplace(model_, row_yields_, Serves::till_the_next, Closing::nearest, contacts_->couplings());
+  couplings_->place(work_.placement, *q_);
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::begin_contacts(double h) {
+  if (!contacts_) return;
+  for (std::size_t k = 0; k < contacts_->touches().size(); ++k) couplings_->set_contact(k, contacts_->law_of(k, h), contacts_->guess_of(k, h));
 }
 
 template <bool kEffects>

@@ -20,12 +20,17 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
       options_(options),
       strategy_(strategy_of(model, options, plan)),
       ties_(model.mimics, model.tree),
-      couplings_(model, plan.row_yields, strategy_.reuses_factor ? Serves::steps_that_follow : Serves::till_the_next),
+      row_yields_(plan.row_yields),
       effects_(plan, model),
       tree_(model.tree) {
   work_.allocate(model.tree.shape);
   if (strategy_.reuses_factor) mass_.allocate(model.tree.shape);
   if (!plan.effects.motions.empty()) given_.allocate(model.tree.shape.velocities);
+  couplings_.emplace(model, row_yields_, strategy_.reuses_factor ? Serves::steps_that_follow : Serves::till_the_next);
+  if (plan.pairs) {
+    contacts_.emplace(*plan.effects.contact);
+    pose_.allocate(model.tree.shape.slots);
+  }
 }
 
 /// motions(part) brings work_.motion up to date on the way down; before_up(part, sum) comes first on the way up.
@@ -79,7 +84,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
   before_up(all_slots(model_.tree), now);
   take_multipliers();
   now.scale = now.energy;
-  couplings_.find_gaps(work_.placement, work_.motion, work_.delta, factor == Factor::fresh ? Asked::rows : Asked::gaps);
+  couplings_->find_gaps(work_.placement, work_.motion, work_.delta, factor == Factor::fresh ? Asked::rows : Asked::gaps);
   act(now);
   pass_up(now, factor);
   return now;
@@ -104,7 +109,7 @@ void TreeSweeps<kEffects>::take_multipliers() {
   if constexpr (kEffects) {
     if (effects_.plan().joints) target = &effects_.plain_target();
   }
-  couplings_.take_multipliers(true, *target);
+  couplings_->take_multipliers(true, *target);
 }
 
 /// Effects on bodies and joints, for the displacements of an evaluation.
@@ -164,8 +169,8 @@ void TreeSweeps<kEffects>::factor_again(Evaluated<double>& now, StepReport& repo
   valid_.end_momenta = false;
   report.factorisations += 1;
   if (!strategy_.one_pass) {
-    if (!couplings_.empty()) couplings_.add_push(work_.residual);
-    couplings_.find_gaps(work_.placement, work_.motion, work_.delta, Asked::rows);
+    if (!couplings_->empty()) couplings_->add_push(work_.residual);
+    couplings_->find_gaps(work_.placement, work_.motion, work_.delta, Asked::rows);
     factor();
     now.norm = pass_residual();
     return;
@@ -215,7 +220,7 @@ Evaluated<double> TreeSweeps<kEffects>::arrive_and_evaluate(double h_before, Sta
 
 template <bool kEffects>
 Evaluated<double> TreeSweeps<kEffects>::correct(double factor, StepReport& report) {
-  couplings_.correct(factor);
+  couplings_->correct(factor);
   const auto motions = [&](Slots part) {
     place_again(part);
     correct_motion_map(model_.tree, *constants_, work_.applied, factor, part, work_.delta, work_.motion);
@@ -231,7 +236,7 @@ Evaluated<double> TreeSweeps<kEffects>::solve_and_correct(StepReport& report) {
       pass_down(work_.applied);
     } else {
       std::swap(work_.increment, work_.applied);  // pass_residual has solved already
-      couplings_.apply();
+      couplings_->apply();
     }
     return correct(1, report);
   }
@@ -267,11 +272,11 @@ double TreeSweeps<kEffects>::slope_along(const Field<double>& innovation_before)
 
 template <bool kEffects>
 bool TreeSweeps<kEffects>::at_floor(const Evaluated<double>& now, double fall, double epsilons) {
-  if (!couplings_.empty() && is_rounding(now.norm, couplings_.rounding(), epsilons)) return true;  // where nothing moves, gaps are all there is
+  if (!couplings_->empty() && is_rounding(now.norm, couplings_->rounding(), epsilons)) return true;  // where nothing moves, gaps are all there is
   if (!below_ceiling(now.norm, now.energy, fall)) return false;
   complete();
   const double rounding = rounding_floor_map(model_.tree, *constants_, work_.momentum_target, work_.impulse, yields());
-  return is_rounding(now.norm, rounding + couplings_.rounding(), epsilons);
+  return is_rounding(now.norm, rounding + couplings_->rounding(), epsilons);
 }
 
 /// h x momenta at the beginning of a step of displacement work_.delta from where the bodies are; returns h^2 x its kinetic energy.

@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,7 @@
 #include "engine/options.hpp"
 #include "engine/solve/judge.hpp"
 #include "engine/step_report.hpp"
+#include "engine/sweeps/body_contacts.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
 #include "engine/sweeps/down_and_up.hpp"
 #include "engine/sweeps/strategy.hpp"
@@ -61,10 +63,10 @@ class TreeSweeps {
   /// How far open couplings are at the positions of the last refresh.
   Assembly openness();
   /// After an evaluation or a refresh: of the row that is farthest open, its gap beside the size of its mechanism, the number of its coupling.
-  double widest_gap() const { return couplings_.widest_gap(); }
+  double widest_gap() const { return couplings_->widest_gap(); }
   Index widest_coupling() const;
   /// Whether all gaps are within this share of the size of their mechanism, but for rows that others hold already.
-  bool is_closed(double share) const { return couplings_.empty() || couplings_.widest_pushed_gap() <= share; }
+  bool is_closed(double share) const { return couplings_->empty() || couplings_->widest_pushed_gap() <= share; }
   /// Coordinates of cables brought to their lengths at the positions of the last refresh, and a refresh; not those whose motion is given.
   void measure_cables(Field<double>& q);
   /// Velocities brought to the nearest, as the mass matrix measures, that leave couplings closed.
@@ -91,12 +93,14 @@ class TreeSweeps {
   /// Before all else of a step from these positions, which must stay where they are until it is over.
   void start(const Field<double>& q, double h) {
     q_ = &q;
-    couplings_.begin(h);
+    couple_contacts();
+    couplings_->begin(h);
+    begin_contacts(h);
   }
   /// Whether multipliers of couplings begin with those of the steps before; these by the shares of the first guess, after start.
-  bool guesses_multipliers() const { return couplings_.has_history(); }
-  void guess_multipliers(const Extrapolation& guess) { couplings_.guess(std::span(guess.shares).first(static_cast<std::size_t>(guess.terms))); }
-  void remember_multipliers() { couplings_.remember(); }
+  bool guesses_multipliers() const { return couplings_->has_history(); }
+  void guess_multipliers(const Extrapolation& guess) { couplings_->guess(std::span(guess.shares).first(static_cast<std::size_t>(guess.terms))); }
+  void remember_multipliers() { couplings_->remember(); }
   /// Before the evaluations of a step with effects. scale: what Evaluated::scale gets beside the energy.
   void begin(double scale);
   Evaluated<double> evaluate(Factor factor, StepReport& report);
@@ -140,7 +144,7 @@ class TreeSweeps {
   /// The factor: part of a checkpoint where it outlasts a step.
   std::vector<std::span<double>> factor_memory() {
     std::vector<std::span<double>> memory{work_.gain_up.flat(), work_.gain_down.flat(), work_.joint_inverse.flat()};
-    couplings_.each_kept([&](std::span<double> numbers) { memory.push_back(numbers); });
+    couplings_->each_kept([&](std::span<double> numbers) { memory.push_back(numbers); });
     return memory;
   }
 
@@ -154,27 +158,53 @@ class TreeSweeps {
   /// Those that are read as v.
   void momentum_read_as(const Field<double>& v, Field<double>& p) {
     momentum_of(v, p);
-    couplings_.take_excess(options_.step, v, p);
+    couplings_->take_excess(options_.step, v, p);
     fold_mimics(ties_.mimics(), p);
   }
   /// Whether some coupling does.
-  bool gives_way() const { return couplings_.gives_way(); }
+  bool gives_way() const { return couplings_->gives_way(); }
+  /// Contacts of bodies with each other, where a scene has any: of the step solved last, of h, before it arrives; before: displacement of
+  /// the step before; book(slot, what they took [J]).
+  template <class Book>
+  void end_contacts(double h, const Field<double>& before, const Book& book) {
+    if (contacts_) contacts_->keep(h, *couplings_, before, work_.delta, book);
+  }
+  /// Then, while bodies are where they were: what contacts pushed.
+  template <class Account>
+  void account_for_contacts(double h, Account& impulses) {
+    if (!contacts_) return;
+    std::ranges::fill(work_.momentum.flat(), 0.0);
+    couplings_->add_contacts(1 / h, work_.momentum);
+    impulses.add_between(contacts_->impulses(h), pose_, work_.momentum);
+  }
+  /// At the end of the last step [J].
+  double contact_potential() const { return contacts_ ? contacts_->stored() : 0; }
+  bool has_contacts() const { return contacts_.has_value(); }
+  std::span<double> contact_memory() { return contacts_ ? contacts_->memory() : std::span<double>(); }
+  void forget_contacts() {
+    if (contacts_) contacts_->forget();
+  }
   /// What couplings that give way push at the end of a step of h: before it arrives; returns what they took [J]. After it: p gets it.
-  double end_couplings(double h) { return couplings_.end(h); }
+  double end_couplings(double h) { return couplings_->end(h); }
   void add_coupling_ends(double h, Field<double>& p) {
-    couplings_.add_end(true, p);
-    couplings_.change_step(h, options_.step, 1, p);
+    couplings_->add_end(true, p);
+    couplings_->change_step(h, options_.step, 1, p);
   }
   /// h (p + h/2 Q) of a step of h, where momenta are those of steps of options.step.
-  void change_step(double h, Field<double>& target) { couplings_.change_step(options_.step, h, h, target); }
+  void change_step(double h, Field<double>& target) { couplings_->change_step(options_.step, h, h, target); }
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
   /// Fills with NaN what no sweep may read before it is written again, once a step is over and the next has not begun. Only where compiled
   /// with LINDEN_POISON.
   void poison_scratch();
   /// At the end of a step with effects: what velocities are read from beside p.
-  void end_reading(const Field<double>& before, bool known) {
+  void end_reading(double h, const Field<double>& before, bool known) {
     if constexpr (kEffects) {
+      if (contacts_) {
+        std::ranges::fill(work_.momentum.flat(), 0.0);
+        couplings_->add_contacts(0.5 / h, work_.momentum);
+        effects_.add_to_reading(work_.momentum);
+      }
       effects_.end_reading(*constants_, work_.placement, true, work_.delta, before, known, work_.impulse, work_.increment);
     }
   }
@@ -191,6 +221,8 @@ class TreeSweeps {
   void place_all();
   void place_again(Slots part);
   void find_potentials(const Field<double>& q);
+  void couple_contacts();
+  void begin_contacts(double h);
   void advance(Slots part, State<double>& state);
   void arrive_down(Slots part, State<double>& state);
   void arrive_up(Slots part, double h, bool found, State<double>& state);
@@ -226,7 +258,7 @@ class TreeSweeps {
   double slope_along(const Field<double>& innovation_before) const;
   double along(const Field<double>& correction) const;
   /// What ties joints, or bodies, makes the whole solve necessary for the norm.
-  bool solves_with_residual() const { return !ties_.empty() || !couplings_.empty(); }
+  bool solves_with_residual() const { return !ties_.empty() || !couplings_->empty(); }
   Gains<double> gains() { return {work_.gain_up, work_.gain_down, work_.joint_inverse}; }
   Gains<double> mass_gains() { return strategy_.reuses_factor ? Gains<double>{mass_.gain_up, mass_.gain_down, mass_.joint_inverse} : gains(); }
   Vec3<double> gravity() const { return {options_.gravity[0], options_.gravity[1], options_.gravity[2]}; }
@@ -243,7 +275,10 @@ class TreeSweeps {
   std::vector<double> applied_;  // empty: no force but gravity
   Workspace<double> work_;
   MimicTies<double> ties_;
-  CouplingSweeps<double> couplings_;
+  std::optional<BodyContacts> contacts_;               // of a scene that has any
+  std::optional<CouplingSweeps<double>> couplings_;    // made anew where other contacts come; never empty
+  std::span<const double> row_yields_;
+  Field<double, 12> pose_;                             // of bodies in the world, for contacts
   [[no_unique_address]] EffectsIf<kEffects, double> effects_;
   DownAndUp<Evaluated<double>> tree_;
   Field<double> read_;  // see read_velocity

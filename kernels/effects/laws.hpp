@@ -4,7 +4,8 @@
 //   JointLaws   rows of joints
 //   BodyLaws    forces on bodies
 //
-// What acts between two bodies - loops, contact of bodies with each other - will be a third list, of rows that couple two places of the tree.
+// What acts between two bodies - loops, contact of bodies with each other - has no law here: it is rows of couplings, and their laws stand in
+// kernels/couplings/.
 //
 // Whatever goes over all effects goes over these lists: engine/effects/ (plan, sweeps within a step, impulses), engine/sweeps/ (the printed
 // schedule and what each sweep costs), engine/baseline/.
@@ -159,8 +160,8 @@ consteval bool laws_are_complete() {
     require_body_parts<Law, S>();
     ++laws[kListOf<typename Law::Entry>];
   });
-  for (const int count : laws) {
-    if (count != 1) return false;
+  for (std::size_t list = 0; list < laws.size(); ++list) {
+    if (laws[list] != (kEffectFacts[list]->site == Site::pair ? 0 : 1)) return false;
   }
   return true;
 }

@@ -34,7 +34,7 @@ class Checker {
     Effects::each(effects_, [&]<class Entry>(std::span<const Entry> entries, std::string_view list) {
       std::unordered_set<Index> seen;
       for (std::size_t k = 0; k < entries.size(); ++k) {
-        where_ = std::is_same_v<Entry, Ground> ? std::string(list) : fmt::format("{}[{}]", list, k);
+        where_ = std::is_same_v<Entry, Ground> || std::is_same_v<Entry, PairContact> ? std::string(list) : fmt::format("{}[{}]", list, k);
         look(entries[k]);
         if constexpr (Entry::facts.single) {
           if (!seen.insert(entries[k].row).second)
@@ -135,6 +135,28 @@ class Checker {
     }
   }
   void look(const Ground& ground) { check_ground(ground); }
+  void look(const PairContact& contact) const {
+    positive("stiffness", contact.stiffness);
+    not_negative("friction", contact.friction);
+    for (const ConvexBody& shape : contact.shapes) {
+      if (shape.slot != 0) require_slot(shape.slot);
+      not_negative("the radius of a shape", shape.shape.radius);
+      for (const double half : shape.shape.half) not_negative("half an edge of a shape", half);
+      if ((shape.shape.kind == ConvexKind::hull) != (shape.shape.hull != nullptr)) fail("a shape has a hull and is none, or the other way round", "one of both", "make it by convex_of");
+      if (shape.shape.hull) check_hull(*shape.shape.hull);
+    }
+    if (!std::ranges::is_sorted(contact.shapes, {}, &ConvexBody::slot)) fail("its shapes are in no order", "bodies in ascending order", "sort them by slot");
+    for (const auto& [a, b] : contact.pairs) {
+      if (a >= b || b >= contact.shapes.size()) {
+        fail(fmt::format("shapes {} and {} are a pair", a, b), fmt::format("two of its {} shapes, the first before the second", contact.shapes.size()),
+             "take them from pairs_of");
+      }
+      if (contact.shapes[a].slot == contact.shapes[b].slot) {
+        fail(fmt::format("shapes {} and {} are of one body", a, b), "shapes of two bodies", "leave the pair out");
+      }
+    }
+    if (!std::ranges::is_sorted(contact.pairs)) fail("its pairs are in no order", "pairs in ascending order", "sort them");
+  }
 
   [[noreturn]] void fail(const std::string& found, std::string_view expected, std::string_view advice) const {
     throw InputError(fmt::format("effects.{}: {}; expected {}; {}", where_, found, expected, advice));
@@ -239,6 +261,24 @@ class Checker {
       for (const double value : block.half) not_negative("half an edge of a contact", value);
       not_negative("the radius of a contact", block.radius);
     }
+  }
+
+  /// What kernels rely on: numbers of points and faces that there are.
+  void check_hull(const ConvexHull& hull) const {
+    const std::size_t points = hull.points.size(), faces = hull.faces.size();
+    const auto below = [](const auto& numbers, std::size_t most) { return std::ranges::all_of(numbers, [&](std::uint32_t n) { return n < most; }); };
+    const auto ranges = [&](const std::vector<std::uint32_t>& first, std::size_t numbers) {
+      return first.size() == points + 1 && std::ranges::is_sorted(first) && first.front() == 0 && first.back() == numbers;
+    };
+    bool sound = points > 0 && below(hull.corners, points) && below(hull.face_of, faces) && below(hull.neighbour, points) && below(hull.extreme, points) &&
+                 ranges(hull.first_face, hull.face_of.size()) && ranges(hull.first_neighbour, hull.neighbour.size()) && std::isfinite(hull.reach);
+    for (const ConvexHull::Face& face : hull.faces) {
+      sound = sound && face.count > 0 && static_cast<std::size_t>(face.first) + face.count <= hull.corners.size();
+    }
+    for (const auto& point : hull.points) {
+      for (const double coordinate : point) finite("a point of a hull", coordinate);
+    }
+    if (!sound) fail("a hull is damaged", "one of convex_hull", "make it anew");
   }
 
   void check_terrain(const HeightField& terrain) {

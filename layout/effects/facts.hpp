@@ -15,8 +15,9 @@
 
 namespace linden {
 
-/// What an effect acts on: entries of joints have a velocity row, or of a ball joint a slot; entries of bodies have a slot.
-enum class Site : std::uint8_t { joint, body };
+/// What an effect acts on: entries of joints have a velocity row, or of a ball joint a slot; entries of bodies have a slot. What acts between pairs of
+/// bodies is no force that a law adds, but rows of couplings (engine/sweeps/coupling_sweeps.hpp).
+enum class Site : std::uint8_t { joint, body, pair };
 
 /// What becomes of the energy that an effect exchanges: nothing, as the effect keeps or stores it; or it is booked, as taken by what can
 /// only take, or as given by what drives. A step of an order above 2 goes back in time between whiles, where only the first have a place, and

@@ -33,9 +33,9 @@ LinkPairs srdf_disabled_pairs(const std::string& file) {
 }
 
 CollisionPairs::CollisionPairs(const Model& model, const LinkPairs& disabled) {
-  for (Index i = 0; i < model.tree.shape.slots; ++i) parent_.push_back(model.tree.parent(i));
+  for (Index i = 0; i < model.tree.shape.slots; ++i) parent_.push_back(model.tree.kind(i) == JointKind::free ? -1 : model.tree.parent(i));
   for (const Coupling& coupling : model.couplings) {
-    if (coupling.kind == CouplingKind::gear || coupling.kind == CouplingKind::cable) continue;
+    if (coupling.kind == CouplingKind::gear || coupling.kind == CouplingKind::cable || coupling.kind == CouplingKind::rod) continue;
     tied_.emplace(std::min(coupling.slot_a, coupling.slot_b), std::max(coupling.slot_a, coupling.slot_b));
   }
   for (const auto& [one, other] : disabled) {

@@ -2,9 +2,10 @@
 // Which links may touch each other. Not looked at are
 //
 //   - links of one body
-//   - neighbours in the tree: the bodies on both sides of a joint, of any kind, which overlap where it sits; so what is fixed to the world and a body
-//     that hangs on the world, by a free joint too
-//   - bodies that a coupling ties; gears tie coordinates and cables run past bodies, so these do not count
+//   - neighbours in the tree: the bodies on both sides of a joint, of any kind but a free one, which overlap where it sits; so what is fixed to the
+//     world and a body that hangs on the world
+//   - bodies that a coupling ties; gears tie coordinates, cables, rods and springs run between bodies, so these do not
+//     count
 //   - links that a caller names, as SRDF files do
 #pragma once
 

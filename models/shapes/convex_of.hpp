@@ -15,13 +15,6 @@
 
 namespace linden {
 
-struct ConvexBody {
-  Index slot;        // body that carries it; 0: fixed to the world
-  std::string link;  // that has it
-  Pose pose;         // of the shape's axes in the body's frame
-  ConvexShape shape;
-};
-
 /// Of all shapes of a model, those fixed to the world first, in the order of its slots. Notes say which meshes were not found or not read, and so
 /// touch nothing, and how many stand as their hulls.
 std::vector<ConvexBody> convex_of(const Model& model, std::vector<std::string>& notes);

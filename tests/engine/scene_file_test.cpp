@@ -845,7 +845,7 @@ TEST_CASE("the scenes of the project can be run", "[scene]") {
 
 TEST_CASE("the scenes of the page on scenes are scenes", "[scene]") {
   const Folder folder;
-  for (const char* file : {"arm.urdf", "four_bar.urdf", "humanoid.urdf"})
+  for (const char* file : {"arm.urdf", "crate.urdf", "four_bar.urdf", "humanoid.urdf"})
     std::filesystem::copy_file(LINDEN_MODELS_DIR + std::string("/") + file, folder / file);
   folder.write("push.csv", "0,0\n1,2\n");
   const std::string page = text_of(kScenes + "README.md"), fence = "```yaml\n";
@@ -856,7 +856,7 @@ TEST_CASE("the scenes of the page on scenes are scenes", "[scene]") {
     CHECK(parse_scene(text, folder.file("s.yaml")).model.warnings.empty());
     ++scenes;
   }
-  CHECK(scenes == 6);
+  CHECK(scenes == 7);
   CHECK_THAT(page, Contains("no joint\n\"left_kne_pitch\" moves in model \"humanoid\"; expected one that does; did you mean"));
   check_message(
       kHumanoid + "effects: {damping: {left_kne_pitch: 1}}\n", 3,

@@ -131,6 +131,20 @@ def test_four_corners_share_a_weight() -> None:
     np.testing.assert_allclose(np.abs(places[:, :2]), np.full((4, 2), 0.1), atol=1e-6)
 
 
+def test_bodies_push_each_other() -> None:
+    scene = linden.load_scene(SCENES / "crates.yaml")
+    sim = linden.Simulation(scene)
+    sim.run(1500)
+    sim.keep_forces()
+    sim.step()
+    between = [contact for contact in sim.contacts if contact.other]
+    assert {(contact.body, contact.other) for contact in between} == {("above/crate", "below/crate")}
+    assert sum(contact.force[2] for contact in between) == pytest.approx(204 * 9.81, abs=0.02)
+    assert all(contact.normal[2] == pytest.approx(1, abs=1e-3) for contact in between)
+    with pytest.raises(linden.InputError, match="effects.contact"):
+        linden.Batch(scene, 2)
+
+
 def test_contacts_are_asked_for_before_the_step() -> None:
     sim = linden.Simulation(SCENES / "humanoid_drop.yaml")
     sim.step()

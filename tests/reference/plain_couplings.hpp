@@ -108,7 +108,9 @@ class PlainCouplings {
           break;
         }
         case CouplingKind::gear:
-        case CouplingKind::cable: break;
+        case CouplingKind::cable:
+        case CouplingKind::face_contact:
+        case CouplingKind::round_contact: break;
       }
     }
     VectorX<T> result(static_cast<Eigen::Index>(rows_.size()));

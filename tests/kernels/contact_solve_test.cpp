@@ -1,0 +1,315 @@
+#include "kernels/couplings/contact_solve.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tests/kernels/allocation_counter.hpp"
+
+namespace linden::contact_solve_test {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix2d;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kHeld = std::numeric_limits<double>::infinity();
+
+class Numbers {
+ public:
+  explicit Numbers(std::uint64_t seed) : engine_(seed) {}
+  double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
+  /// Spread evenly over the powers of ten between them.
+  double of_sizes(double low, double high) { return std::pow(10.0, between(low, high)); }
+  Index count(int low, int high) { return std::uniform_int_distribution<int>(low, high)(engine_); }
+  MatrixXd matrix(Index rows, Index columns) {
+    return MatrixXd::NullaryExpr(rows, columns, [&] { return std::normal_distribution<double>()(engine_); });
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+struct Problem {
+  MatrixXd S;
+  VectorXd b, lambda, guess;
+  std::vector<double> yields;
+  std::vector<std::size_t> first;
+  std::vector<ContactLaw> laws;
+
+  explicit Problem(Index rows)
+      : S(MatrixXd::Zero(rows, rows)), b(VectorXd::Zero(rows)), lambda(b), guess(b), yields(static_cast<std::size_t>(rows), 0.0) {}
+
+  Index rows() const { return b.size(); }
+  double yield(Index row) const { return yields[static_cast<std::size_t>(row)]; }
+  std::vector<Index> linear_rows() const {
+    std::vector<Index> list;
+    for (Index k = 0; k < rows(); ++k) {
+      const auto row = static_cast<std::size_t>(k);
+      const bool of_contact = std::ranges::any_of(first, [&](std::size_t at) { return row >= at && row < at + 3; });
+      if (!of_contact) list.push_back(k);
+    }
+    return list;
+  }
+};
+
+VectorXd solved(ContactSolve& solver, const Problem& problem) {
+  const std::vector<double> guess(problem.guess.data(), problem.guess.data() + problem.rows());
+  const std::vector<double> lambda(problem.lambda.data(), problem.lambda.data() + problem.rows());
+  const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> S = problem.S;
+  VectorXd z = problem.b;
+  solver.solve({{S.data(), static_cast<std::size_t>(S.size())}, problem.yields, problem.first, problem.laws, lambda, guess},
+               {z.data(), static_cast<std::size_t>(z.size())});
+  return z;
+}
+
+VectorXd solved(const Problem& problem) {
+  ContactSolve solver;
+  return solved(solver, problem);
+}
+
+/// By how much z misses what is asked of it, beside the largest there is of its kind.
+double violation(const Problem& problem, const VectorXd& z) {
+  const VectorXd opens = problem.S * z - problem.b, x = problem.lambda + z;
+  const double scale = 1 + x.lpNorm<Eigen::Infinity>();
+  double worst = 0;
+  for (const Index k : problem.linear_rows()) {
+    worst = std::max(worst, problem.yield(k) == kHeld ? std::abs(z[k]) : std::abs(opens[k] + problem.yield(k) * z[k]) / scale);
+  }
+  for (std::size_t c = 0; c < problem.first.size(); ++c) {
+    const auto at = static_cast<Index>(problem.first[c]);
+    const ContactLaw& law = problem.laws[c];
+    const Vector2d s = opens.segment<2>(at), friction = -law.friction * x[at + 2] * s / std::max(s.norm(), law.creep);
+    worst = std::max(worst, std::abs(x[at + 2] - law.stiffness * std::max(-(opens[at + 2] + law.lift), 0.0)) / scale);
+    worst = std::max(worst, (x.segment<2>(at) - friction).norm() / scale);
+  }
+  return worst;
+}
+
+/// Friction of the load N on a point that would move by `free`, and moves by free + S x: x = -drag (free + S x), drag found by bisection.
+Vector2d friction_of(double load, const ContactLaw& law, const Matrix2d& S, const Vector2d& free) {
+  double low = 0, high = law.friction * load / law.creep;
+  const auto moves = [&](double drag) { return Vector2d((Matrix2d::Identity() + drag * S).inverse() * free); };
+  if (moves(high).norm() > law.creep) {
+    for (int k = 0; k < 200 && high - low > 1e-16 * high; ++k) {
+      const double drag = (low + high) / 2;
+      (drag * moves(drag).norm() < law.friction * load ? low : high) = drag;
+    }
+  }
+  return -high * moves(high);
+}
+
+/// The plain twin: row after row, of a contact its normal and then its friction, as if all others stood, until nothing changes.
+VectorXd settled(const Problem& problem) {
+  const MatrixXd& S = problem.S;
+  VectorXd z = VectorXd::Zero(problem.rows());
+  for (int sweep = 0; sweep < 100000; ++sweep) {
+    const VectorXd before = z;
+    for (const Index k : problem.linear_rows()) {
+      if (problem.yield(k) != kHeld) z[k] += (problem.b[k] - S.row(k) * z - problem.yield(k) * z[k]) / (S(k, k) + problem.yield(k));
+    }
+    for (std::size_t c = 0; c < problem.first.size(); ++c) {
+      const auto at = static_cast<Index>(problem.first[c]), n = at + 2;
+      const ContactLaw& law = problem.laws[c];
+      const double x = problem.lambda[n] + z[n], free = S.row(n) * z - problem.b[n] - S(n, n) * x + law.lift;
+      const double load = std::max(0.0, -law.stiffness * free / (1 + law.stiffness * S(n, n)));
+      z[n] = load - problem.lambda[n];
+      const Matrix2d across = S.block<2, 2>(at, at);
+      const Vector2d moves = S.middleRows<2>(at) * z - problem.b.segment<2>(at);
+      z.segment<2>(at) = friction_of(load, law, across, moves - across * (problem.lambda + z).segment<2>(at)) - problem.lambda.segment<2>(at);
+    }
+    if ((z - before).lpNorm<Eigen::Infinity>() <= 1e-15 * (1 + z.lpNorm<Eigen::Infinity>())) return z;
+  }
+  FAIL("the plain twin does not settle");
+  return z;
+}
+
+/// Contacts and linear rows in any order; multipliers, right sides and lifts of all signs and sizes that there are.
+Problem random_problem(Numbers& random) {
+  const Index contacts = random.count(1, 6), linear = random.count(0, 3), rows = 3 * contacts + linear;
+  Problem problem(rows);
+  const MatrixXd J = random.matrix(rows, rows + 6);
+  problem.S = J * J.transpose() / static_cast<double>(rows + 6);
+  problem.b = random.matrix(rows, 1);
+  problem.lambda = random.matrix(rows, 1);
+  problem.guess = random.matrix(rows, 1);
+  std::vector<Index> blocks(static_cast<std::size_t>(contacts), 3);
+  for (Index k = 0; k < linear; ++k) blocks.insert(blocks.begin() + random.count(0, static_cast<int>(blocks.size())), 1);
+  Index row = 0;
+  for (const Index block : blocks) {
+    if (block == 3) {
+      problem.first.push_back(static_cast<std::size_t>(row));
+      problem.b.segment<2>(row) *= random.of_sizes(-2, 0);
+      problem.b[row + 2] *= 5;
+      problem.laws.push_back({random.of_sizes(-3, 3) / problem.S(row + 2, row + 2), random.between(0, 0.5), random.of_sizes(-5, -1),
+                              random.count(0, 1) == 0 ? 0 : random.between(0, 0.5)});
+    } else {
+      const double kinds[] = {0, random.of_sizes(-2, 1), kHeld};
+      problem.yields[static_cast<std::size_t>(row)] = kinds[random.count(0, 2)];
+    }
+    row += block;
+  }
+  return problem;
+}
+
+/// One contact of a body of 2 kg: a ball that may turn gives way across 3.5 times as easily as one that may not.
+Problem single(double across, const Vector3d& b, const ContactLaw& law, const Vector3d& lambda = Vector3d::Zero()) {
+  Problem problem(3);
+  problem.S.diagonal() << across, across, 0.5;
+  problem.b = b;
+  problem.lambda = lambda;
+  problem.first = {0};
+  problem.laws = {law};
+  return problem;
+}
+
+}  // namespace
+
+TEST_CASE("multipliers of contacts are those of the law, and all other rows close", "[contact_solve]") {
+  Numbers random(1);
+  double worst = 0, apart = 0;
+  int pressing = 0, sliding = 0, sticking = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Problem problem = random_problem(random);
+    CAPTURE(trial, problem.first.size(), problem.rows());
+    const VectorXd z = solved(problem), twin = settled(problem);
+    worst = std::max(worst, violation(problem, z));
+    apart = std::max(apart, (z - twin).lpNorm<Eigen::Infinity>() / (1 + twin.lpNorm<Eigen::Infinity>()));
+    REQUIRE(violation(problem, twin) < 1e-9);
+    REQUIRE(violation(problem, z) < 1e-9);
+    const VectorXd opens = problem.S * z - problem.b;
+    for (std::size_t c = 0; c < problem.first.size(); ++c) {
+      const auto at = static_cast<Index>(problem.first[c]);
+      if (problem.lambda[at + 2] + z[at + 2] <= 0) continue;
+      ++pressing;
+      ++(opens.segment<2>(at).norm() > problem.laws[c].creep ? sliding : sticking);
+    }
+  }
+  CAPTURE(worst, apart, pressing, sliding, sticking);
+  CHECK(apart < 1e-9);
+  CHECK(sliding > 100);
+  CHECK(sticking > 20);
+}
+
+TEST_CASE("whatever a solve begins with, it ends with the same multipliers", "[contact_solve]") {
+  Numbers random(2);
+  double apart = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    Problem problem = random_problem(random);
+    const VectorXd z = solved(problem);
+    for (const double size : {0.0, 1.0, 100.0}) {
+      problem.guess = size * random.matrix(problem.rows(), 1);
+      apart = std::max(apart, (solved(problem) - z).lpNorm<Eigen::Infinity>() / (1 + z.lpNorm<Eigen::Infinity>()));
+    }
+  }
+  CHECK(apart < 1e-9);
+}
+
+TEST_CASE("a matrix that is slightly unsymmetric changes nothing of that", "[contact_solve]") {
+  Numbers random(4);
+  double worst = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    Problem problem = random_problem(random);
+    problem.S += 1e-3 * random.matrix(problem.rows(), problem.rows());
+    worst = std::max(worst, violation(problem, solved(problem)));
+  }
+  CHECK(worst < 1e-9);
+}
+
+TEST_CASE("one contact that rests, slides, rolls or parts is a closed form", "[contact_solve]") {
+  const double K = 1e4, mu = 0.5, creep = 1e-9;
+  const ContactLaw law{K, mu, creep, 0};
+  const double load = K * 2e-3 / (1 + 0.5 * K);  // that holds what would come 2 mm nearer
+  SECTION("what rests bears its weight, and pushed a little it creeps by the share of its friction that holds it") {
+    const Vector3d z = solved(single(0.5, {0, 1e-4, 2e-3}, law));
+    CHECK(z[2] == Approx(load).epsilon(1e-13));
+    CHECK(z[0] == 0);
+    const double drag = mu * load / creep;
+    CHECK(z[1] == Approx(drag * 1e-4 / (1 + 0.5 * drag)).epsilon(1e-12));
+    CHECK(std::abs(1e-4 - 0.5 * z[1]) < creep);
+  }
+  SECTION("what slides is dragged against its way by mu times what it bears") {
+    const Vector3d z = solved(single(0.5, {-0.03, 0.04, 2e-3}, law));
+    CHECK(z[2] == Approx(load).epsilon(1e-13));
+    CHECK(z[0] == Approx(-0.6 * mu * load).epsilon(1e-12));
+    CHECK(z[1] == Approx(0.8 * mu * load).epsilon(1e-12));
+  }
+  SECTION("what rolls is held by two sevenths of the friction that would stop it") {
+    const double across = 0.5 * 3.5, speed = 1e-3;
+    const Vector3d z = solved(single(across, {speed, 0, 2e-3}, law));
+    CHECK(z[0] == Approx(speed / across).epsilon(1e-5));
+    CHECK(z[0] < mu * load);
+    CHECK(std::abs(speed - across * z[0]) < creep);
+  }
+  SECTION("what parts loses what pushed it") {
+    const Vector3d lambda{0.01, -0.02, 0.05};
+    const Vector3d z = solved(single(0.5, {0.1, 0, -0.2}, law, lambda));
+    CHECK((z + lambda).norm() < 1e-15);
+  }
+  SECTION("depth that is lifted does not push") {
+    const Vector3d z = solved(single(0.5, {0, 0, 2e-3}, {K, mu, creep, 1.5e-3}));
+    CHECK(z[2] == Approx(load / 4).epsilon(1e-12));
+  }
+  SECTION("nothing touches where stiffness is zero") { CHECK(solved(single(0.5, {0.1, 0, 2e-3}, {0, mu, creep, 0})).norm() == 0); }
+}
+
+TEST_CASE("stacks of ten are solved in a few corrections", "[contact_solve]") {
+  Numbers random(5);
+  int most = 0, sum = 0, most_rounds = 0;
+  double worst = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    // points on top of each other, the lowest on the floor; they come down, and slide, at speeds of their own
+    constexpr Index kBodies = 10;
+    constexpr double kStep = 1e-3;
+    Problem problem(3 * kBodies);
+    VectorXd mobility(kBodies), speed(3 * kBodies);
+    for (Index k = 0; k < kBodies; ++k) {
+      mobility[k] = 1 / random.of_sizes(-1, 1);
+      speed.segment<3>(3 * k) << random.between(-0.1, 0.1), random.between(-0.1, 0.1), random.between(-0.2, 0.1) - 9.81 * kStep;
+      for (Index j = 0; j < 3; ++j) {
+        const Index row = 3 * k + j;
+        problem.S(row, row) = mobility[k] + (k > 0 ? mobility[k - 1] : 0);
+        if (k > 0) problem.S(row, row - 3) = problem.S(row - 3, row) = -mobility[k - 1];
+        problem.b[row] = -kStep * (speed[row] - (k > 0 ? speed[row - 3] : 0));
+      }
+      problem.first.push_back(static_cast<std::size_t>(3 * k));
+      problem.laws.push_back({kStep * kStep * random.of_sizes(6, 9), random.between(0, 1), kStep * 1e-6, 0});
+    }
+    ContactSolve solver;
+    const VectorXd z = solved(solver, problem);
+    worst = std::max(worst, violation(problem, z) * (1 + z.lpNorm<Eigen::Infinity>()) / z.lpNorm<Eigen::Infinity>());
+    most = std::max(most, solver.corrections());
+    most_rounds = std::max(most_rounds, solver.rounds());
+    sum += solver.corrections();
+  }
+  CAPTURE(most, sum, most_rounds, worst);
+  CHECK(worst < 2e-9);
+  CHECK(most <= 60);
+  CHECK(most_rounds <= 2);
+  CHECK(sum <= 3000);
+}
+
+TEST_CASE("a solve of as many rows as before allocates nothing", "[contact_solve]") {
+  Numbers random(6);
+  Problem problem = random_problem(random);
+  while (problem.rows() != 18) problem = random_problem(random);
+  const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> S = problem.S;
+  const std::vector<double> lambda(18, 0.1), guess(18, 0.0);
+  std::vector<double> z(18);
+  const ContactSolve::Rows rows{{S.data(), static_cast<std::size_t>(S.size())}, problem.yields, problem.first, problem.laws, lambda, guess};
+  ContactSolve solver;
+  std::copy_n(problem.b.data(), 18, z.begin());
+  solver.solve(rows, z);
+  std::copy_n(problem.b.data(), 18, z.begin());
+  const AllocationCounter counter;
+  solver.solve(rows, z);
+  const auto count = counter.count();
+  CHECK(count == 0);
+}
+
+}  // namespace linden::contact_solve_test
