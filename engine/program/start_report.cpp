@@ -16,10 +16,11 @@ namespace {
 
 void note(const std::string& text) { tell("note: {}", text); }
 
-/// A load that gravity is missing beside: "a ground", "servos", "springs"; empty where there is none.
+/// A load that gravity is missing beside: "a ground", "servos", "contact", "springs"; empty where there is none.
 std::string load_of(const Effects& effects) {
   if (effects.ground) return "a ground";
   if (!effects.servos.empty()) return "servos";
+  if (effects.contact) return "contact";
   bool springs = false;
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
     springs = springs || (Entry::facts.stores && !entries.empty());

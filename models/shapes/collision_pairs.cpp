@@ -12,7 +12,9 @@ namespace linden {
 
 LinkPairs srdf_disabled_pairs(const std::string& file) {
   tinyxml2::XMLDocument document;
-  if (document.LoadFile(file.c_str()) != tinyxml2::XML_SUCCESS) {
+  const tinyxml2::XMLError error = document.LoadFile(file.c_str());
+  if (error == tinyxml2::XML_ERROR_FILE_NOT_FOUND) throw InputError(fmt::format("{}: there is no such file; expected an SRDF file; check the path", file));
+  if (error != tinyxml2::XML_SUCCESS) {
     throw InputError(fmt::format("{}: it cannot be read as XML ({}); expected an SRDF file", file, document.ErrorStr()));
   }
   const tinyxml2::XMLElement* robot = document.RootElement();

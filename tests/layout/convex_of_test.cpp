@@ -114,7 +114,7 @@ TEST_CASE("an SRDF file says which pairs are disabled") {
   CHECK_THAT(refusal([&] { srdf_disabled_pairs(folder.file("half.srdf")); }), Contains("half.srdf:2: <disable_collisions> without link1 and link2"));
   folder.write("other.srdf", "<model/>");
   CHECK_THAT(refusal([&] { srdf_disabled_pairs(folder.file("other.srdf")); }), Contains("its root is <model>; expected <robot>"));
-  CHECK_THAT(refusal([&] { srdf_disabled_pairs(folder.file("absent.srdf")); }), Contains("cannot be read as XML"));
+  CHECK_THAT(refusal([&] { srdf_disabled_pairs(folder.file("absent.srdf")); }), Contains("there is no such file"));
 }
 
 }  // namespace
