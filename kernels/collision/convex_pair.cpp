@@ -34,7 +34,18 @@ Separation between_lines(const PlacedConvex& a, const PlacedConvex& b, double si
   s = nearest_s(t);
   const Vec3<double> between = d + t * v - s * u;
   const double distance = length_of(between);
-  if (distance > 1e-12 * size) return {between / distance, distance, false};
+  if (distance > 1e-12 * size) {
+    // where lines nearly touch rounding turns what is between them: an end of theirs would stand out by as much of their lengths
+    Vec3<double> n = between / distance;
+    const bool along_a = std::abs(s) < half_a, along_b = std::abs(t) < half_b;
+    if (along_a) n = n - dot(n, u) * u;
+    if (along_b) {
+      const Vec3<double> w = along_a ? cross(turned, u) : v;  // of v what is across u
+      const double ww = dot(w, w);
+      if (ww > 0) n = n - (dot(n, w) / ww) * w;
+    }
+    return {n / length_of(n), distance, false};
+  }
   Vec3<double> n = sine_square > 1e-24 && half_a > 0 && half_b > 0 ? turned / std::sqrt(sine_square) : Vec3<double>{0, 0, 0};
   if (dot(n, n) == 0) {
     const Vec3<double> line = half_a > 0 ? u : half_b > 0 ? v : Vec3<double>{1, 0, 0};
