@@ -46,7 +46,9 @@ class EffectSweeps {
         body_laws_(laws_of<BodyLaws<S>>(plan.setup(model.tree))) {
     sum_.allocate(tree_.shape);  // factors of blocks add joints and bodies whichever there are
     for (Field<S>* field : {&excess_, &excess_before_, &reading_, &bend_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
-    if (plan.pairs) between_.allocate(tree_.shape.velocities);
+    if (plan.pairs) {
+      for (Field<S>* field : {&between_, &between_before_, &between_reading_}) field->allocate(tree_.shape.velocities);
+    }
     if (plan.rotor.rows() > 0) {
       rotors_.allocate(plan.rotor.rows());
       for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
@@ -205,11 +207,13 @@ class EffectSweeps {
   auto memory() {
     const auto of_laws = [](auto&... law) { return std::tuple_cat(law.memory()...); };
     return std::apply([](const auto&... numbers) { return std::array{numbers...}; },
-                      std::tuple_cat(std::apply(of_laws, body_laws_), std::tuple(excess_before_.flat(), reading_.flat(), bend_.flat()),
+                      std::tuple_cat(std::apply(of_laws, body_laws_), std::tuple(excess_before_.flat(), between_before_.flat(), between_reading_.flat(), reading_.flat(), bend_.flat()),
                                      std::apply(of_laws, joint_laws_)));
   }
   Field<S>& excess_before() { return excess_before_; }
   Field<S>& reading() { return reading_; }
+  /// What acts between bodies has of it; no rows where nothing does.
+  const Field<S>& between_reading() const { return between_reading_; }
   Field<S>& bend() { return bend_; }
 
   /// What is kept beside the numbers of rows, EffectPlan::kept() of them: what each law keeps, those of bodies before those of joints.
@@ -290,22 +294,23 @@ class EffectSweeps {
                    const Field<S>& before, const Mask& known, Field<S, 6>& scratch, Field<S>& projected) {
     using std::abs;
     const S most = as<S>(kMostRead), zero(0.0), rate = as<S>(kMostBend) / h_, any = as<S>(kAnyBend);
-    const bool on_bodies = plan_.bodies || plan_.pairs;
     if (plan_.bodies) {
       std::ranges::copy(bodies_.start_excess.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
-    } else if (on_bodies) {
-      std::ranges::fill(projected.flat(), zero);
     }
-    for (Index row = 0; row < between_.rows(); ++row) projected(row) = projected(row) + between_(row);
+    for (Index row = 0; row < between_.rows(); ++row) {
+      between_reading_(row) = select(moves, persistent(between_(row), between_before_(row)), between_reading_(row));
+      between_before_(row) = select(moves, between_(row), between_before_(row));
+    }
     auto stopped = zero > zero;  // a limit has stopped a joint, and changed all velocities
     for (Index row = 0; row < reading_.rows(); ++row) {
       S read = plan_.joints ? excess_(row) : zero;
       stopped = stopped || (read > most && delta(row) != zero);
-      if (on_bodies) {
+      if (plan_.bodies) {
         read = select(read > most, read, read + persistent(projected(row), excess_before_(row)));
         excess_before_(row) = select(moves, projected(row), excess_before_(row));
       }
+      if (plan_.pairs) read = select(read > most, read, read + between_reading_(row));
       reading_(row) = select(moves, read, reading_(row));
     }
     for (Index row = 0; plan_.bends && row < bend_.rows(); ++row) {
@@ -358,6 +363,7 @@ class EffectSweeps {
   void read_as(const Field<S>& momentum, const Field<S>& p) {
     for (Index row = 0; row < p.rows(); ++row) reading_(row) = momentum(row) - p(row);
     for (const JointMotion& motion : motions().entries) reading_(motion.row) = S(kHeld);
+    std::ranges::fill(between_reading_.flat(), S(0.0));
     forget_bends();
   }
   const Limits<S>& limits() const { return law<LimitsLaw<S>>().limits(); }
@@ -371,7 +377,7 @@ class EffectSweeps {
     const auto forgets = [](auto& law) { law.forget(); };
     each_law(body_laws_, forgets);
     each_law(joint_laws_, forgets);
-    for (Field<S>* field : {&excess_before_, &reading_}) std::ranges::fill(field->flat(), S(0.0));
+    for (Field<S>* field : {&excess_before_, &between_before_, &between_reading_, &reading_}) std::ranges::fill(field->flat(), S(0.0));
     std::ranges::fill(bend_.flat(), as<S>(kAnyBend));
   }
 
@@ -448,7 +454,9 @@ class EffectSweeps {
   const Tree& tree_;
   S h_{};
   double stiction_speed_ = 0;
-  Field<S> between_;           // see add_to_reading; no rows where nothing acts between bodies
+  Field<S> between_;           // see add_to_reading; no rows where nothing acts between bodies, likewise below
+  Field<S> between_before_;    // the same of the step before
+  Field<S> between_reading_;   // what of it lasted, in reading_
   Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
   Field<S> excess_before_;     // the same of bodies, seen from the joints, of the step before
   Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held

@@ -420,11 +420,12 @@ Energy TreeStepper<kEffects>::energy_of(const State<double>& state, Field<double
   const Field<double>& read = sweeps_.read_velocity(state.p, rate);
   double kinetic = 0;
   for (Index row = 0; row < rate.rows(); ++row) kinetic += 0.5 * read(row) * rate(row);
-  within_bend(state, rate);
   if constexpr (kEffects) {
-    const double ground = effects_.ground_potential(), contact = sweeps_.contact_potential();
-    return {kinetic, sweeps_.potential(), sweeps_.effect_potential() - ground - contact, ground, contact};
+    const double late = sweeps_.late_in_reading(rate), ground = effects_.ground_potential(), contact = sweeps_.contact_potential();
+    within_bend(state, rate);
+    return {kinetic, sweeps_.potential() + late, sweeps_.effect_potential() - ground - contact, ground, contact + late};
   }
+  within_bend(state, rate);
   return {kinetic, sweeps_.potential(), sweeps_.effect_potential()};
 }
 

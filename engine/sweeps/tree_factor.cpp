@@ -194,6 +194,22 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
 }
 
 template <bool kEffects>
+double TreeSweeps<kEffects>::late_in_reading(const Field<double>& v) {
+  if constexpr (kEffects) {
+    const Field<double>& lasted = effects_.between_reading();
+    if (std::ranges::all_of(lasted.flat(), [](double push) { return push == 0; })) return 0;
+    // 1/2 (p - c).M^-1 (p - c) - 1/2 p.M^-1 p
+    work_.momentum = lasted;
+    fold_mimics(ties_.mimics(), work_.momentum);
+    apply_mass_inverse(work_.momentum, work_.increment, nullptr, Coupled::reading);
+    double sum = 0;
+    for (Index row = 0; row < v.rows(); ++row) sum += work_.momentum(row) * (0.5 * work_.increment(row) - v(row));
+    return sum;
+  }
+  return 0;
+}
+
+template <bool kEffects>
 std::vector<CouplingState> TreeSweeps<kEffects>::couplings(double h) const {
   std::vector<CouplingState> states;
   for (std::size_t row = 0; const Coupling& coupling : model_.couplings) {

@@ -194,6 +194,9 @@ class TreeSweeps {
   void change_step(double h, Field<double>& target) { couplings_->change_step(options_.step, h, h, target); }
   /// As Stepper, but for how much the motion bends. Returns the momenta that belong to it.
   const Field<double>& read_velocity(const Field<double>& p, Field<double>& v);
+  /// Kinetic energy that contacts are yet to take, v having been read with what they push in the half step to come; with the factor of the reading [J].
+  /// With what they have stored it is kept as they work, in the middle of steps.
+  double late_in_reading(const Field<double>& v);
   /// Fills with NaN what no sweep may read before it is written again, once a step is over and the next has not begun. Only where compiled
   /// with LINDEN_POISON.
   void poison_scratch();

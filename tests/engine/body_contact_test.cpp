@@ -263,8 +263,8 @@ TEST_CASE("what collides in free flight keeps its momentum", "[body_contact]") {
   CHECK(distance(before.linear, after.linear) < 1e-13);
   CHECK(distance(before.angular, after.angular) < 1e-13);
   CHECK(simulation.energy().total() < 0.8 * start);
-  CHECK(account.rises < 6e-3);  // what is stored is told of two steps, velocities of one
-  CHECK(account.strays < 0.05);
+  CHECK(account.rises < 1e-10);
+  CHECK(account.strays < 1e-3);
 }
 
 TEST_CASE("falls onto each other give no energy", "[body_contact]") {
@@ -279,10 +279,9 @@ TEST_CASE("falls onto each other give no energy", "[body_contact]") {
     worst.between = std::max(worst.between, account.between);
     worst.strays = std::max(worst.strays, account.strays);
   }
-  // what is told jumps to and fro where blows begin and end; between states next to nothing comes
   CHECK(worst.between < 2.6e-3);
-  CHECK(worst.rises < 2.1);
-  CHECK(worst.strays < 1.6);
+  CHECK(worst.rises < 2e-3);
+  CHECK(worst.strays < 0.05);
 }
 
 TEST_CASE("a pile comes to rest at any step", "[body_contact]") {
@@ -293,7 +292,8 @@ TEST_CASE("a pile comes to rest at any step", "[body_contact]") {
     const Account account = accounted(simulation, 4);
     CHECK(account.fell > 10);
     CHECK(account.between < 3e-4);
-    CHECK(account.rises < 1);
+    CHECK(account.rises < 3e-3);
+    CHECK(account.strays < 0.1);
     for (std::size_t k = 0; k < 5; ++k) CHECK(place(simulation, k).z() > 0.0999);
   }
 }

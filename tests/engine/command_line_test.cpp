@@ -388,6 +388,32 @@ TEST_CASE("energy that strays is said aloud", "[command line]") {
   CHECK(json_of(shell / "a.json").at("advice").is_string());
 }
 
+TEST_CASE("energy is not said to stray where a body is set down on another, or strikes it in many steps", "[command line]") {
+  const Shell shell;
+  const std::string inertial = R"(<inertial><mass value="1"/><inertia ixx="0.0067" iyy="0.0067" izz="0.0067" ixy="0" ixz="0" iyz="0"/></inertial>)";
+  const auto solid = [&](const std::string& name) {
+    shell.write(name + ".urdf", "<robot name=\"" + name + "\"><link name=\"" + name + "\">" + inertial +
+                                    R"(<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>)");
+  };
+  solid("block");
+  const std::string slab = R"(<robot name="slab"><link name="slab"><collision><origin xyz="0 0 -0.5"/><geometry><box size="9 9 1"/></geometry></collision></link>)";
+  shell.write("slab.urdf", slab + "<link name=\"weight\">" + inertial + R"(</link><joint name="slider" type="prismatic"><parent link="slab"/>)" +
+                               R"(<child link="weight"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>)");
+  const auto run = [&](double height, double step) {
+    shell.write("scene.yaml", "models:\n  - {model: slab.urdf, name: slab}\n  - {model: block.urdf, name: block, base: floating, position: [0, 0, " +
+                                  std::to_string(height) + "]}\neffects: {gravity: [0, 0, -9.81], contact: {}}\n");
+    return shell.linden("run scene.yaml --duration 1 --dt " + std::to_string(step));
+  };
+  for (const double step : {1e-4, 1e-3, 1e-2}) {
+    for (const double height : {0.1, 0.3}) {
+      const Outcome outcome = run(height, step);
+      CAPTURE(step, height, outcome.out);
+      CHECK(outcome.exit_code == 0);
+      CHECK(outcome.err.empty());
+    }
+  }
+}
+
 TEST_CASE("what a file says and no run obeys is said aloud", "[command line]") {
   const Shell shell;
   CHECK_THAT(shell.linden("run '" + kArm + "' --duration 0.01").out, Contains("\nignored"));
