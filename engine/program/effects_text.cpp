@@ -151,8 +151,17 @@ std::string what_of(std::span<const Ground> list, const Effects&, const Model&) 
 
 std::string what_of(std::span<const PairContact> list, const Effects&, const Model&) {
   const PairContact& contact = list.front();
-  return fmt::format("stiffness {:g} N/m, friction {:g}; {}", contact.stiffness, contact.friction,
-                     counted(std::ssize(contact.pairs), "pair"));
+  const std::span<const ContactMaterial> materials(contact.materials);
+  const auto range = [&](double ContactMaterial::* member) { return range_text(materials, [&](const ContactMaterial& one) { return one.*member; }); };
+  const auto any = [&](double ContactMaterial::* member) {
+    return std::ranges::any_of(materials, [&](const ContactMaterial& one) { return one.*member > 0; });
+  };
+  const bool rigid = std::ranges::all_of(materials, [](const ContactMaterial& one) { return std::isinf(one.stiffness); });
+  std::string text = rigid ? std::string("rigid") : fmt::format("stiffness {} N/m", range(&ContactMaterial::stiffness));
+  if (any(&ContactMaterial::damping)) text += fmt::format(", damping {} N s/m", range(&ContactMaterial::damping));
+  text += fmt::format(", friction {}", range(&ContactMaterial::friction));
+  if (any(&ContactMaterial::restitution)) text += fmt::format(", restitution {}", range(&ContactMaterial::restitution));
+  return fmt::format("{}; {}", text, counted(std::ssize(contact.pairs), "pair"));
 }
 
 /// "23 joints", "1 body", "plane", "12 shapes".
@@ -232,7 +241,12 @@ Json json_of(const Ground& g) {
 }
 
 Json json_of(const PairContact& contact) {
-  return {{"stiffness", contact.stiffness}, {"friction", contact.friction}, {"shapes", contact.shapes.size()}, {"pairs", contact.pairs.size()}};
+  Json materials = Json::array();
+  for (const ContactMaterial& one : contact.materials) {
+    Json stiffness = std::isfinite(one.stiffness) ? Json(one.stiffness) : Json("rigid");
+    materials.push_back({{"stiffness", stiffness}, {"damping", one.damping}, {"friction", one.friction}, {"restitution", one.restitution}});
+  }
+  return {{"materials", materials}, {"shapes", contact.shapes.size()}, {"pairs", contact.pairs.size()}};
 }
 
 /// The joint or body that it acts on, and its values.

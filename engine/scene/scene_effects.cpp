@@ -48,7 +48,8 @@ const std::vector<std::string> kFrames{"world", "body"};
 const std::vector<std::string> kDrag{"linear", "quadratic", "wind", "bodies"};
 const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
-const std::vector<std::string> kContact{"stiffness", "friction", "pairs", "except", "srdf"};
+const std::vector<std::string> kContact{"stiffness", "damping", "friction", "restitution", "between", "pairs", "except", "srdf"};
+const std::vector<std::string> kBetween{"links", "stiffness", "damping", "friction", "restitution"};
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
 /// By which a curve may round beyond a limit that one of its points lies on [rad, m].
@@ -337,12 +338,13 @@ class EffectsReader {
   }
 
   void read(const SceneValue& at, Of<PairContact>) {
-    double stiffness = PairContact().stiffness, friction = PairContact().friction;
+    ContactMaterial material;
     LinkPairs only, disabled;
+    std::vector<SceneValue> between;
     if (!at.is(Kind::nothing)) {
       at.entries_of(kContact);
-      if (const auto value = at.find("stiffness")) stiffness = value->positive();
-      if (const auto value = at.find("friction")) friction = value->not_negative();
+      read_material(at, material);
+      if (const auto value = at.find("between")) between = value->list("[{links: [link, link], ...}, ...]");
       if (const auto value = at.find("srdf")) disabled = value->located([&] { return srdf_disabled_pairs(scene_path(*value, folder_)); });
       if (const auto value = at.find("except")) disabled = joined(std::move(disabled), link_pairs(*value));
       if (const auto value = at.find("pairs")) {
@@ -353,11 +355,53 @@ class EffectsReader {
     std::vector<std::string> notes;
     PairContact contact;
     at.located([&] { contact = pair_contact_of(model_, notes, disabled, only); });
-    contact.stiffness = stiffness;
-    contact.friction = friction;
+    contact.materials = {material};
+    for (const SceneValue& one : between) read_between(one, contact);
     if (contact.pairs.empty()) notes.push_back("no two links that may touch have collision shapes: nothing touches");
     for (std::string& note : notes) warn(std::move(note));
     result_.effects.contact = std::move(contact);
+  }
+
+  static void read_material(const SceneValue& at, ContactMaterial& material) {
+    if (const auto value = at.find("stiffness")) {
+      const bool rigid = value->is(Kind::text) && value->text("rigid") == "rigid";
+      material.stiffness = rigid ? std::numeric_limits<double>::infinity() : value->positive();
+    }
+    if (const auto value = at.find("damping")) material.damping = value->not_negative();
+    if (const auto value = at.find("friction")) material.friction = value->not_negative();
+    if (const auto value = at.find("restitution")) material.restitution = restitution_of(*value);
+  }
+
+  /// Values of what touches between two links, or of all that touches one, over those of entries before.
+  void read_between(const SceneValue& at, PairContact& contact) const {
+    at.entries_of(kBetween);
+    const auto links = at.find("links");
+    if (!links) at.fail(at.path() + " names no links", "links: [link, link], or [link] for all that touches it", "add it");
+    std::vector<std::string> names;
+    for (const SceneValue& item : links->list("[link, link]")) {
+      names.push_back(item.text("a link"));
+      item.located([&] { place_of(model_, names.back()); });
+    }
+    if (names.empty() || names.size() > 2) {
+      links->fail(fmt::format("{} names {} links", links->path(), names.size()), "one or two", "write [link, link], or [link] for all that touches it");
+    }
+    contact.of_pair.resize(contact.pairs.size(), 0);
+    std::size_t found = 0;
+    for (std::size_t pair = 0; pair < contact.pairs.size(); ++pair) {
+      const std::string &a = contact.shapes[contact.pairs[pair].first].link, &b = contact.shapes[contact.pairs[pair].second].link;
+      const bool meant = a == names[0] ? names.size() == 1 || b == names[1] : b == names[0] && (names.size() == 1 || a == names[1]);
+      if (!meant) continue;
+      found += 1;
+      ContactMaterial material = contact.material(pair);
+      read_material(at, material);
+      auto known = std::ranges::find(contact.materials, material);
+      if (known == contact.materials.end()) known = contact.materials.insert(known, material);
+      contact.of_pair[pair] = static_cast<std::uint32_t>(known - contact.materials.begin());
+    }
+    if (found == 0) {
+      links->fail(fmt::format("{}: nothing that touches is between {}", links->path(), fmt::join(names, " and ")),
+                  "links with collision shapes that may touch", "look at pairs, except and the links' shapes, or leave it out");
+    }
   }
 
   /// [[link, link], ...]

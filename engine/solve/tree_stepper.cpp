@@ -225,6 +225,7 @@ void TreeStepper<kEffects>::begin_effects(const State<double>& state, double h)
     sweeps_.velocity_of(state.p, before_);
     for (double& value : before_.flat()) value *= h;
   }
+  sweeps_.begin_contacts(h, before_);
   effects_.begin({time_}, h, state.q, before_, state.last_step(0) != 0, passable_, work_.delta);
   sweeps_.begin(solve_.fall(h));
 }

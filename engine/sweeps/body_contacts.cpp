@@ -17,8 +17,9 @@ constexpr double kNearBy = 0.02;
 /// Contacts that are remembered, for each shape; no shape is touched at more places at once.
 constexpr std::size_t kMostOfShape = 32;
 
-/// Numbers of one: its pair, from 1; both halves of its feature; the force on b in the world's frame, and along the normal [N].
-constexpr std::size_t kNumbers = 7, kForce = 3, kLoad = 6;
+/// Numbers of one: its pair, from 1; both halves of its feature; the force on b in the world's frame, and of the spring alone [N]; how deep that is
+/// pressed [m].
+constexpr std::size_t kNumbers = 8, kForce = 3, kSpring = 6, kDepth = 7;
 
 Vec3<double> vector(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
@@ -57,7 +58,13 @@ std::array<double, 9> directions_of(const Vec3<double>& n) {
 
 }  // namespace
 
-BodyContacts::BodyContacts(const PairContact& contact) : contact_(contact) {
+BodyContacts::BodyContacts(const PairContact& contact, const BodyConstants<double>& bodies) : contact_(contact) {
+  const auto mass = [&](std::size_t shape) {
+    const Index slot = contact.shapes[shape].slot;
+    if (slot == 0) return std::numeric_limits<double>::infinity();
+    return bodies.inertia(slot, 0) > 0 ? bodies.inertia(slot, 0) : bodies.subtree_mass(slot);
+  };
+  for (const auto& [a, b] : contact.pairs) lighter_.push_back(std::min(mass(a), mass(b)));
   for (const ConvexBody& shape : contact.shapes) reach_.push_back(core_reach(shape.shape) + shape.shape.radius);
   poses_.resize(contact.shapes.size());
   memory_.assign(first_number() + kNumbers * std::min(kMostOfShape * contact.shapes.size(), 4 * contact.pairs.size()), 0.0);
@@ -114,6 +121,7 @@ bool BodyContacts::find(const Field<double, 12>& pose) {
   }
   changed = changed || count != coupled_;
   couplings_.resize(count);
+  steps_.resize(count);
   coupled_ = count;
   return changed;
 }
@@ -128,17 +136,33 @@ std::span<const double> BodyContacts::remembered(std::size_t touch) const {
 
 double BodyContacts::stored_of_last() const {
   double sum = 0;
-  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) sum += stored_by(memory_[at + kLoad]);
+  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) sum += 0.25 * memory_[at + kSpring] * memory_[at + kDepth];
   return sum;
 }
 
-ContactLaw BodyContacts::law_of(std::size_t touch, double h) const {
-  double borne = 0;  // the most of its pair
-  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) {
-    if (static_cast<std::size_t>(memory_[at]) - 1 == touches_[touch].pair) borne = std::max(borne, memory_[at + kLoad]);
+ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, double gravity) {
+  const Touch& at = touches_[touch];
+  const ContactMaterial& material = contact_.material(at.pair);
+  const double rigid = kRigid * lighter_[at.pair] / (h * h), stiffness = std::min(material.stiffness, rigid);
+  Step& step = steps_[touch];
+  step = {.law = {h * h * stiffness, material.friction, h * kCreep, 0}, .stiffness = stiffness, .spring_lift = 0};
+  const double fall = 2 * h * h * gravity;
+  if (material.restitution > 0 && -opened > h * kLeastRebound + fall && at.gap + opened < fall) {
+    step.law.stiffness = h * h * rigid;
+    step.law.lift = material.restitution * opened - at.gap;
+    step.stiffness = 0;
+    return step.law;
   }
-  const double depth = std::max(0.0, -touches_[touch].gap), known = borne / contact_.stiffness + h * kRecoverySpeed;
-  return {h * h * contact_.stiffness, contact_.friction, h * kCreep, std::max(0.0, depth - known)};
+  double borne = 0;  // the deepest of its pair
+  for (std::size_t one = first_number(); one < memory_.size() && memory_[one] != 0; one += kNumbers) {
+    if (static_cast<std::size_t>(memory_[one]) - 1 == at.pair) borne = std::max(borne, memory_[one + kDepth]);
+  }
+  const double gap = std::min(0.0, at.gap);
+  step.spring_lift = std::max(0.0, -gap - borne - h * kRecoverySpeed);
+  const double spring = step.law.stiffness, damper = h * material.damping;
+  step.law.stiffness = spring + damper;
+  step.law.lift = (spring * step.spring_lift - damper * gap) / (spring + damper);
+  return step.law;
 }
 
 std::array<double, 3> BodyContacts::guess_of(std::size_t touch, double h) const {
@@ -172,9 +196,10 @@ void BodyContacts::remember() {
   }
   std::size_t at = first_number();
   for (std::size_t k = 0; k < touches_.size() && at < memory_.size(); ++k) {
-    if (forces_[k][2] == 0) continue;
+    if (forces_[k][2] == 0 || steps_[k].stiffness == 0) continue;
     const Vec3<double> force = force_on_b(k);
-    const std::array numbers{static_cast<double>(touches_[k].pair + 1), half_of(touches_[k].feature, 0), half_of(touches_[k].feature, 1), force.x, force.y, force.z, forces_[k][2]};
+    const std::array numbers{static_cast<double>(touches_[k].pair + 1), half_of(touches_[k].feature, 0), half_of(touches_[k].feature, 1),
+                             force.x, force.y, force.z, steps_[k].spring(), steps_[k].depth};
     std::ranges::copy(numbers, memory_.begin() + static_cast<std::ptrdiff_t>(at));
     at += kNumbers;
   }

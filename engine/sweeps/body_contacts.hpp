@@ -10,10 +10,17 @@
 // What is stored is k (d^2 + d'^2) / 4 of the depths d and d' at the ends of a step, N = k d' of that step: then work along the mean displacement of two
 // steps, -N (s + s') / 2, is what is stored less k (d'' - d)^2 / 4, so that a passive contact never gives.
 //
+// A damper adds c (d' - d) / h while a place is pressed: h^2 k + h c takes the place of h^2 k, and what it takes is not stored.
+//
+// What comes together faster than kLeastRebound, and than gravity makes it in two steps, and would meet in this one, is to go apart by restitution
+// times as much (Newton's law, as Moreau steps it): as if rigid, for this step. What is rigid has the stiffness with which it yields kRigid times less
+// than the lighter of both bodies moves under the same push.
+//
 // Depth that the motion did not make, of a start within each other or of an edge that was not met before, comes to push at kRecoverySpeed: what it
 // stores is what it bore in the last step, and that much more.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -21,6 +28,7 @@
 
 #include "engine/effects/step_impulses.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
+#include "layout/body_constants.hpp"
 #include "layout/effects/contact.hpp"
 #include "layout/field.hpp"
 #include "layout/pose.hpp"
@@ -29,6 +37,9 @@ namespace linden {
 
 /// Speed at which depth that the motion did not make may come to push [m/s].
 inline constexpr double kRecoverySpeed = 1e-2;
+
+/// What comes together more slowly does not bounce [m/s]. Of what strikes faster a thousandth of the speed is at most lost beside its restitution.
+inline constexpr double kLeastRebound = 0.05, kRigid = 1e6;
 
 class BodyContacts {
  public:
@@ -43,8 +54,8 @@ class BodyContacts {
   /// What it bore in the last step, along `across` [N]: two across, one along the normal.
   using Force = std::array<double, 3>;
 
-  /// It must outlive this.
-  explicit BodyContacts(const PairContact& contact);
+  /// Of a model with these bodies, by which rigid contact goes. The contact must outlive this.
+  BodyContacts(const PairContact& contact, const BodyConstants<double>& bodies);
 
   /// At these poses of the bodies. Whether the contacts are others than those of the last time.
   bool find(const Field<double, 12>& pose);
@@ -52,8 +63,8 @@ class BodyContacts {
   /// The same as rows; made anew by find.
   std::span<const Coupling> couplings() const { return couplings_; }
 
-  /// What a step of h begins with.
-  ContactLaw law_of(std::size_t touch, double h) const;
+  /// What a step of h begins with. opened: by how much its gap changed in the last one, had that been as long [m]; gravity [m/s^2].
+  ContactLaw begin(std::size_t touch, double h, double opened, double gravity);
   std::array<double, 3> guess_of(std::size_t touch, double h) const;
   /// Of the step solved last, of h, before bodies are placed at its end; before, now: displacements of the step before and of this one.
   /// book(slot of b, energy) of what each took [J].
@@ -69,7 +80,8 @@ class BodyContacts {
         forces_[k][j] = impulse[j] / (h * h);
         given += forces_[k][j] * opens[j];
       }
-      memory_[0] += stored_by(forces_[k][2]);
+      steps_[k].depth = steps_[k].depth_of(impulse[2]);
+      memory_[0] += 0.25 * steps_[k].spring() * steps_[k].depth;
       if (given != 0) book(couplings_[k].slot_b, -given);
     }
     if (stored() != stored_before) book(0, stored_before - stored());
@@ -87,9 +99,21 @@ class BodyContacts {
   void forget();
 
  private:
+  /// The law of a touch in the step that has begun.
+  struct Step {
+    ContactLaw law;
+    double stiffness;    // of the spring alone [N/m]; 0 where the place rebounds: nothing is stored
+    double spring_lift;  // ContactLaw::lift of it [m]
+    double depth = 0;    // by which it is pressed at the end [m]
+
+    double spring() const { return stiffness * depth; }
+    /// With this impulse along the normal, times h.
+    double depth_of(double impulse) const {
+      return impulse > 0 && stiffness > 0 ? std::max(0.0, impulse / law.stiffness + law.lift - spring_lift) : 0;
+    }
+  };
+
   void remember();
-  /// Of a contact's share of the potential that goes with N of one step [J].
-  double stored_by(double N) const { return 0.25 * N * N / contact_.stiffness; }
   /// Those of what is remembered of the last step.
   double stored_of_last() const;
   Vec3<double> force_on_b(std::size_t touch) const;
@@ -98,7 +122,9 @@ class BodyContacts {
   std::size_t first_number() const { return 1 + 3 * contact_.shapes.size(); }
 
   const PairContact& contact_;
+  std::vector<double> lighter_;  // of each pair, of both bodies [kg]
   std::vector<Touch> touches_;
+  std::vector<Step> steps_;      // of each
   std::vector<Coupling> couplings_;
   std::vector<Force> forces_;
   std::vector<double> memory_;  // what is stored, middles of shapes at the beginning of the last step, what each contact bore

@@ -258,6 +258,8 @@ class CouplingSweeps {
     laws_[contact] = law;
     for (std::size_t j = 0; j < 3; ++j) guess_[first_of(contact) + j] = as<S>(guess[j]);
   }
+  /// By how much a displacement changes the gap of a contact, from where bodies are at the beginning.
+  S opened(std::size_t contact, const Field<S>& displacement) const { return opening(first_of(contact) + 2, displacement); }
   /// Of the step solved last: the impulse along each of its rows, times h; how far each opens at its beginning in the mean of it and of the step
   /// before, of these displacements: what an impulse between the two works along. Before bodies are placed at its end.
   std::array<S, 3> impulse_of(std::size_t contact) const {

@@ -1,5 +1,6 @@
 // Of tree_sweeps.hpp: where the bodies are, what potentials do to them there, and the end of a step.
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <string_view>
 
@@ -51,9 +52,13 @@ void TreeSweeps<kEffects>::couple_contacts() {
 }
 
 template <bool kEffects>
-void TreeSweeps<kEffects>::begin_contacts(double h) {
+void TreeSweeps<kEffects>::begin_contacts(double h, const Field<double>& before) {
   if (!contacts_) return;
-  for (std::size_t k = 0; k < contacts_->touches().size(); ++k) couplings_->set_contact(k, contacts_->law_of(k, h), contacts_->guess_of(k, h));
+  const Vec3<double> g = gravity();
+  const double weight = strategy_.gravity ? std::sqrt(dot(g, g)) : 0;
+  for (std::size_t k = 0; k < contacts_->touches().size(); ++k) {
+    couplings_->set_contact(k, contacts_->begin(k, h, couplings_->opened(k, before), weight), contacts_->guess_of(k, h));
+  }
 }
 
 template <bool kEffects>

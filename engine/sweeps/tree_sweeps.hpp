@@ -95,12 +95,13 @@ class TreeSweeps {
     q_ = &q;
     couple_contacts();
     couplings_->begin(h);
-    begin_contacts(h);
   }
   /// Whether multipliers of couplings begin with those of the steps before; these by the shares of the first guess, after start.
   bool guesses_multipliers() const { return couplings_->has_history(); }
   void guess_multipliers(const Extrapolation& guess) { couplings_->guess(std::span(guess.shares).first(static_cast<std::size_t>(guess.terms))); }
   void remember_multipliers() { couplings_->remember(); }
+  /// The laws of contacts in a step of h, after start; before: displacement of the step before, had it been as long.
+  void begin_contacts(double h, const Field<double>& before);
   /// Before the evaluations of a step with effects. scale: what Evaluated::scale gets beside the energy.
   void begin(double scale);
   Evaluated<double> evaluate(Factor factor, StepReport& report);
@@ -225,7 +226,6 @@ class TreeSweeps {
   void place_again(Slots part);
   void find_potentials(const Field<double>& q);
   void couple_contacts();
-  void begin_contacts(double h);
   void advance(Slots part, State<double>& state);
   void arrive_down(Slots part, State<double>& state);
   void arrive_up(Slots part, double h, bool found, State<double>& state);

@@ -7,7 +7,7 @@
 //   lambda_t = -mu N s / max(|s|, h v_s)                         rubs: sticks, creeping by v_s at most, or slides against its way
 //
 // lift takes from the gap what the motion did not make: depth that a step found and the last one did not bear comes to push slowly, and gives no
-// energy to speak of. N, the load that friction goes by, is that of the round before; rounds go on until it stands still. Of a round the solution
+// energy to speak of; where it is negative what strikes is to go apart by so much. N, the load that friction goes by, is that of the round before; rounds go on until it stands still. Of a round the solution
 // is the least of a convex function of the motion,
 //
 //   1/2 z^T S z + sum l(S z - b),    lambda + z = -grad l,    S = J A^-1 G^T
@@ -36,7 +36,7 @@ struct ContactLaw {
   double stiffness = 0;  // h^2 k; 0: nothing touches there
   double friction = 0;   // mu
   double creep = 0;      // h v_s [m]
-  double lift = 0;       // [m], not negative
+  double lift = 0;       // [m]
 };
 
 class ContactSolve {

@@ -136,8 +136,16 @@ class Checker {
   }
   void look(const Ground& ground) { check_ground(ground); }
   void look(const PairContact& contact) const {
-    positive("stiffness", contact.stiffness);
-    not_negative("friction", contact.friction);
+    for (const ContactMaterial& material : contact.materials) {
+      if (!(material.stiffness > 0)) fail(fmt::format("stiffness is {}", material.stiffness), "a positive number, infinite where it is rigid", "leave it out");
+      not_negative("damping", material.damping);
+      not_negative("friction", material.friction);
+      if (!(material.restitution >= 0 && material.restitution <= 1)) fail(fmt::format("restitution is {}", material.restitution), "0 to 1", "0 where nothing bounces");
+    }
+    if (contact.materials.empty()) fail("it has no material", "one at least", "leave materials as they are");
+    if (!contact.of_pair.empty() && (contact.of_pair.size() != contact.pairs.size() || std::ranges::max(contact.of_pair) >= contact.materials.size())) {
+      fail("not every pair has one of its materials", "one number for each pair, or none at all", "leave of_pair empty");
+    }
     for (const ConvexBody& shape : contact.shapes) {
       if (shape.slot != 0) require_slot(shape.slot);
       not_negative("the radius of a shape", shape.shape.radius);

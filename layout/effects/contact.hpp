@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -10,11 +11,22 @@
 
 namespace linden {
 
-struct PairContact {
-  double stiffness = 1e7;  // of one contact point [N/m]
+/// How two shapes meet.
+struct ContactMaterial {
+  double stiffness = std::numeric_limits<double>::infinity();  // of one contact point [N/m]; infinite: rigid
+  double damping = 0;      // of one, while it is pressed [N s/m]
   double friction = 0.8;   // Coulomb's coefficient
+  double restitution = 0;  // speed after a blow beside that before it, 0 to 1
+  bool operator==(const ContactMaterial&) const = default;
+};
+
+struct PairContact {
+  std::vector<ContactMaterial> materials{ContactMaterial{}};
+  std::vector<std::uint32_t> of_pair{};                            // which of them each pair has; empty: all the first
   std::vector<ConvexBody> shapes{};                                // sorted by slot
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs{};    // of shapes that can touch, the first before the second, in ascending order
+
+  const ContactMaterial& material(std::size_t pair) const { return materials[of_pair.empty() ? 0 : of_pair[pair]]; }
 
   static constexpr EffectFacts facts{.name = "contact",
                                      .owners = "pairs of shapes that can touch",

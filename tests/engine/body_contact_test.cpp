@@ -248,6 +248,83 @@ TEST_CASE("a tall stack stands, and so do a thousand kilograms on one", "[body_c
   CHECK((place(simulation, top) - then).norm() < 1e-9);
 }
 
+/// Tops of the flights of a ball that is let go 0.5 m above a floor.
+std::vector<double> tops_of(const Bodies& bodies, const std::string& contact, double step, double time) {
+  Simulation simulation = bodies.scene(kFloor + body("ball", "b", {0, 0, 0.6}), "gravity: [0, 0, -9.81], contact: {" + contact + "}", step);
+  std::vector<double> tops;
+  double last = place(simulation).z(), rose = 0;
+  const double start = simulation.energy().total();
+  for (int k = 0; k < steps_of(time, simulation); ++k) {
+    run(simulation, 1);
+    const double now = place(simulation).z();
+    if (rose > 0 && now <= last && last > 0.1 + 1e-5) tops.push_back(last - 0.1);
+    rose = now - last;
+    last = now;
+    CHECK(simulation.energy().total() + simulation.effect_work().taken() == Approx(start).margin(1e-8));
+  }
+  return tops;
+}
+
+TEST_CASE("a ball bounces by its restitution, at any step and stiffness, and not at all without", "[body_contact]") {
+  const Bodies bodies;
+  for (const double step : {1e-4, 1e-3, 1e-2}) {
+    for (const std::string stiffness : {"rigid", "1e5"}) {
+      CAPTURE(step, stiffness);
+      for (const double restitution : {0.5, 0.9, 1.0}) {
+        const std::vector<double> tops = tops_of(bodies, fmt::format("stiffness: {}, restitution: {}", stiffness, restitution), step, 2);
+        REQUIRE(tops.size() >= 2);
+        double height = 0.5;
+        for (std::size_t k = 0; k < 2; ++k) {
+          height *= restitution * restitution;
+          // a blow comes up to a step early, by v h too high, and leaves out half a step of gravity
+          const double v = 3.14, early = v * step * (1 - restitution * restitution), late = v * step * (1 - restitution) / 2;
+          CHECK(tops[k] == Approx(height).margin(2e-5 + static_cast<double>(k + 1) * (early + late)));
+        }
+      }
+    }
+    CHECK(tops_of(bodies, "", step, 0.6).empty());
+  }
+}
+
+TEST_CASE("what damps a contact takes of a bounce what a damped spring would", "[body_contact]") {
+  const Bodies bodies;
+  const double frequency = std::sqrt(1e5), share = 0.1;  // of a ball of 1 kg, critical damping 1
+  const std::vector<double> free = tops_of(bodies, "stiffness: 1e5", 2e-5, 0.7);
+  const std::vector<double> damped = tops_of(bodies, fmt::format("stiffness: 1e5, damping: {}", 2 * share * frequency), 2e-5, 0.7);
+  REQUIRE(!free.empty());
+  REQUIRE(!damped.empty());
+  CHECK(free[0] == Approx(0.49).margin(0.01));
+  CHECK(damped[0] / free[0] == Approx(std::exp(-2 * M_PI * share / std::sqrt(1 - share * share))).epsilon(0.12));
+}
+
+TEST_CASE("links and pairs of them have materials of their own", "[body_contact]") {
+  const Bodies bodies;
+  Simulation simulation = bodies.scene(
+      kFloor + body("ball", "hard", {0, 0, 0.6}) + body("ball", "dull", {1, 0, 0.6}) + body("block", "icy", {3, 0, 0.1}, ", velocity: [1, 0, 0]") +
+          body("block", "rough", {3, 2, 0.1}, ", velocity: [1, 0, 0]"),
+      "gravity: [0, 0, -9.81], contact: {friction: 0.5, between: [{links: [floor/slab], friction: 0.4}, {links: [hard/ball, floor/slab], restitution: 1}, "
+      "{links: [floor/slab, icy/block], friction: 0}]}");
+  double highest[2] = {0, 0};
+  for (int k = 0; k < 700; ++k) {
+    run(simulation, 1);
+    for (std::size_t j = 0; j < 2 && k > 400; ++j) highest[j] = std::max(highest[j], place(simulation, j).z());
+  }
+  CHECK(highest[0] == Approx(0.6).margin(1e-3));
+  CHECK(highest[1] == Approx(0.1).margin(1e-6));
+  CHECK(place(simulation, 2).x() == Approx(3.7).margin(1e-9));
+  CHECK(place(simulation, 3).x() == Approx(3 + 1 / (2 * 0.4 * kGravity)).epsilon(2e-3));
+  const auto refused = [&](const std::string& contact, const std::string& told) {
+    CHECK_THROWS_WITH(bodies.scene(kFloor + body("ball", "b", {0, 0, 0.6}), "contact: {" + contact + "}"), Catch::Contains(told));
+  };
+  refused("restitution: 1.5", "expected a number from 0 to 1");
+  refused("stiffness: soft", "effects.contact.stiffness");
+  refused("damping: -1", "effects.contact.damping");
+  refused("between: [{friction: 0.4}]", "effects.contact.between[0] names no links");
+  refused("between: [{links: [b/bal]}]", "b/ball");
+  refused("between: [{links: [floor/weight]}]", "nothing that touches is between floor/weight");
+  refused("between: [{links: [b/ball], frction: 1}]", "friction");
+}
+
 TEST_CASE("what collides in free flight keeps its momentum", "[body_contact]") {
   const Bodies bodies;
   const char* other = GENERATE("ball", "block");
