@@ -16,8 +16,9 @@ constexpr int kCalmRound = 6;
 /// Rounds end once loads change by less than this share of the largest.
 constexpr double kSteadyLoad = 1e-12;
 
-/// Corrections end once the function is to fall by this share of what contacts work on what was to happen without them.
-constexpr double kDone = 1e-24;
+/// Corrections end once the function is to fall by this share of what contacts work on what was to happen without them; of a round that is not the
+/// last, whose loads are to change, by no less than the square of a share of that change.
+constexpr double kDone = 1e-24, kFirstDone = 1e-8, kShareOfChange = 1e-2;
 
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning; to where it is this small.
 constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
@@ -35,7 +36,7 @@ void ContactSolve::find_pushes(const Rows& rows, const Eigen::VectorXd& gaps) {
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(rows.first[c]);
     const ContactLaw& law = rows.laws[c];
-    const double depth = -(gaps[at + 2] + law.lift), s1 = gaps[at], s2 = gaps[at + 1], length = std::hypot(s1, s2);
+    const double depth = -(gaps[at + 2] + law.lift), s1 = gaps[at], s2 = gaps[at + 1], length = std::sqrt(s1 * s1 + s2 * s2);
     const bool slides = length > law.creep;
     const double drag = law.friction * loads_[c] > 0 ? law.friction * loads_[c] / std::max(length, law.creep) : 0;
     pushes_[at] = -drag * s1;
@@ -288,6 +289,7 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
   factors_ = 0;
   solve_linear_rows(rows);
   corrections_ = 0;
+  double enough = kFirstDone;
   for (rounds_ = 1; rounds_ <= kMostLoadRounds; ++rounds_) {
     multiply(z_, gaps_);
     gaps_ -= b_;
@@ -303,7 +305,7 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
         }
       }
       const double begin = slope(rows, 0);
-      const bool done = -begin <= kDone * work;
+      const bool done = -begin <= enough * work;
       const double share = done ? 1 : share_of_correction(rows, begin);
       z_ += share * change_;
       gaps_ += share * moved_;
@@ -319,7 +321,9 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
       if (rounds_ >= kCalmRound) load = 0.5 * (load + loads_[c]);
       loads_[c] = load;
     }
-    if (!rubs || changed <= kSteadyLoad * most) break;
+    if (enough <= kDone && (!rubs || changed <= kSteadyLoad * most)) break;
+    const double change = rubs && most > 0 ? kShareOfChange * changed / most : 0;
+    enough = std::clamp(change * change, kDone, kFirstDone);
   }
   for (std::size_t j = 0; j < right_side.size(); ++j) right_side[j] = z_[static_cast<Eigen::Index>(j)];
 }
