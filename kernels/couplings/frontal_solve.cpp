@@ -30,6 +30,7 @@ std::vector<std::size_t> minimum_degree(std::span<const FrontalSolve::Group> gro
     early.push_back(k);
   }
   Pairs pairs;
+  for (std::size_t k = 0; k < early.size(); ++k) pairs.emplace_back(k, k);  // without its diagonal a group counts as one that meets all others
   for (std::size_t e = 0; e + 1 < elements.first.size(); ++e) {
     for (std::size_t i = elements.first[e]; i < elements.first[e + 1]; ++i) {
       for (std::size_t j = elements.first[e]; j < elements.first[e + 1]; ++j) {
