@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <ranges>
 
 #include "kernels/collision/convex_pair.hpp"
 #include "kernels/effects/ground_contact.hpp"
@@ -67,6 +69,14 @@ BodyContacts::BodyContacts(const PairContact& contact, const BodyConstants<doubl
   for (const auto& [a, b] : contact.pairs) lighter_.push_back(std::min(mass(a), mass(b)));
   for (const ConvexBody& shape : contact.shapes) reach_.push_back(core_reach(shape.shape) + shape.shape.radius);
   poses_.resize(contact.shapes.size());
+  // of two shapes the smaller decides, so that the largest need not look farther than the next
+  std::vector<double> sorted = reach_;
+  std::ranges::sort(sorted, std::greater());
+  for (const double reach : reach_) near_.push_back(0.5 * kNearBy * std::min(reach, sorted[std::min<std::size_t>(1, sorted.size() - 1)]));
+  for (std::uint32_t a = 0; a <= contact.shapes.size(); ++a) {
+    const auto of_a = std::ranges::lower_bound(contact.pairs, std::pair(a, std::uint32_t(0)));
+    first_pair_.push_back(static_cast<std::size_t>(of_a - contact.pairs.begin()));
+  }
   memory_.assign(first_number() + kNumbers * std::min(kMostOfShape * contact.shapes.size(), 4 * contact.pairs.size()), 0.0);
   forget();
 }
@@ -88,48 +98,79 @@ bool BodyContacts::find(const Field<double, 12>& pose) {
     const double distance = std::sqrt(dot(step, step));
     if (std::isfinite(distance)) moved[k] = distance;
   }
-  touches_.clear();
-  std::size_t count = 0;
-  bool changed = false;
-  for (std::size_t pair = 0; pair < contact_.pairs.size(); ++pair) {
-    const auto& [a, b] = contact_.pairs[pair];
-    const double margin = kNearBy * std::min(reach_[a], reach_[b]) + 2 * (moved[a] + moved[b]);
-    const Vec3<double> apart = vector(poses_[b].shift.data()) - vector(poses_[a].shift.data());
-    const double reach = reach_[a] + reach_[b] + margin;
-    if (dot(apart, apart) > reach * reach) continue;
-    const ContactPatch patch = contact_patch(contact_.shapes[a].shape, poses_[a], contact_.shapes[b].shape, poses_[b], margin);
-    for (std::size_t k = 0; k < static_cast<std::size_t>(patch.count); ++k, ++count) {
-      const PatchPoint& point = patch.points[k];
-      const bool swapped = is_round(contact_.shapes[a].shape) && !is_round(contact_.shapes[b].shape);
-      const ConvexBody &first = contact_.shapes[swapped ? b : a], &second = contact_.shapes[swapped ? a : b];
-      const Vec3<double> n = swapped ? -1.0 * patch.normal : patch.normal, half = (0.5 * point.gap) * n;
-      touches_.push_back({pair, point.feature, point.gap, {point.place.x, point.place.y, point.place.z}, directions_of(n)});
-      const std::array<double, 9>& d = touches_.back().across;
-      const Mat3<double> R = transpose(Mat3<double>{vector(&d[0]), vector(&d[3]), vector(&d[6])});
-      const bool both = is_round(first.shape) && is_round(second.shape);
-      const CouplingKind kind = both ? CouplingKind::round_contact : CouplingKind::face_contact;
-      if (count == couplings_.size()) couplings_.emplace_back();
-      Coupling& coupling = couplings_[count];
-      changed = changed || coupling.kind != kind || coupling.slot_a != first.slot || coupling.slot_b != second.slot;
-      coupling.kind = kind;
-      coupling.slot_a = first.slot;
-      coupling.slot_b = second.slot;
-      coupling.frame_a = pose_in(load<Placement, double>(pose, first.slot), R, point.place - half);
-      coupling.frame_b = pose_in(load<Placement, double>(pose, second.slot), R, point.place + half);
-      coupling.rounding = {both ? first.shape.radius : 0, is_round(second.shape) ? second.shape.radius : 0};
+  bounds_.clear();
+  for (std::size_t k = 0; k < shapes; ++k) {
+    Bounds& bounds = bounds_.emplace_back(bounds_of(contact_.shapes[k].shape, poses_[k]));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      bounds.low[axis] -= near_[k] + 2 * moved[k];
+      bounds.high[axis] += near_[k] + 2 * moved[k];
     }
   }
-  changed = changed || count != coupled_;
-  couplings_.resize(count);
-  steps_.resize(count);
-  coupled_ = count;
-  return changed;
+  const std::size_t last = couplings_.size();
+  touches_.clear();
+  changed_ = false;
+  for (const auto& [a, b] : broad_phase_.pairs(bounds_, 0)) {
+    const std::size_t pair = number_of(a, b);
+    if (pair == contact_.pairs.size()) continue;
+    add(pair, kNearBy * std::min(reach_[a], reach_[b]) + 2 * (moved[a] + moved[b]), pose);
+  }
+  couplings_.resize(touches_.size());
+  steps_.resize(touches_.size());
+  return changed_ || touches_.size() != last;
+}
+
+std::size_t BodyContacts::number_of(std::uint32_t a, std::uint32_t b) const {
+  const auto begin = contact_.pairs.begin();
+  const auto end = begin + static_cast<std::ptrdiff_t>(first_pair_[a + 1]);
+  const auto found = std::ranges::lower_bound(begin + static_cast<std::ptrdiff_t>(first_pair_[a]), end, std::pair(a, b));
+  return found != end && *found == std::pair(a, b) ? static_cast<std::size_t>(found - begin) : contact_.pairs.size();
+}
+
+/// Where the shapes of a pair touch, or will.
+void BodyContacts::add(std::size_t pair, double margin, const Field<double, 12>& pose) {
+  const auto& [a, b] = contact_.pairs[pair];
+  const Vec3<double> apart = vector(poses_[b].shift.data()) - vector(poses_[a].shift.data());
+  const double reach = reach_[a] + reach_[b] + margin;
+  if (dot(apart, apart) > reach * reach) return;
+  const ContactPatch patch = contact_patch(contact_.shapes[a].shape, poses_[a], contact_.shapes[b].shape, poses_[b], margin);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(patch.count); ++k) {
+    const PatchPoint& point = patch.points[k];
+    const bool swapped = is_round(contact_.shapes[a].shape) && !is_round(contact_.shapes[b].shape);
+    const ConvexBody &first = contact_.shapes[swapped ? b : a], &second = contact_.shapes[swapped ? a : b];
+    const Vec3<double> n = swapped ? -1.0 * patch.normal : patch.normal, half = (0.5 * point.gap) * n;
+    touches_.push_back({pair, point.feature, point.gap, {point.place.x, point.place.y, point.place.z}, directions_of(n)});
+    const std::array<double, 9>& d = touches_.back().across;
+    const Mat3<double> R = transpose(Mat3<double>{vector(&d[0]), vector(&d[3]), vector(&d[6])});
+    const bool both = is_round(first.shape) && is_round(second.shape);
+    const CouplingKind kind = both ? CouplingKind::round_contact : CouplingKind::face_contact;
+    if (touches_.size() > couplings_.size()) couplings_.emplace_back();
+    Coupling& coupling = couplings_[touches_.size() - 1];
+    changed_ = changed_ || coupling.kind != kind || coupling.slot_a != first.slot || coupling.slot_b != second.slot;
+    coupling.kind = kind;
+    coupling.slot_a = first.slot;
+    coupling.slot_b = second.slot;
+    coupling.frame_a = pose_in(load<Placement, double>(pose, first.slot), R, point.place - half);
+    coupling.frame_b = pose_in(load<Placement, double>(pose, second.slot), R, point.place + half);
+    coupling.rounding = {both ? first.shape.radius : 0, is_round(second.shape) ? second.shape.radius : 0};
+  }
+}
+
+/// They are in the order of pairs, and end where nothing is remembered.
+std::span<const double> BodyContacts::remembered_of_pair(std::size_t pair) const {
+  const auto number = [&](std::size_t k) { return memory_[first_number() + kNumbers * k]; };
+  const auto search = [&](double least) {
+    const auto places = std::views::iota(std::size_t(0), (memory_.size() - first_number()) / kNumbers);
+    return static_cast<std::size_t>(std::ranges::partition_point(places, [&](std::size_t k) { return number(k) != 0 && number(k) < least; }) - places.begin());
+  };
+  const auto name = static_cast<double>(pair + 1);
+  const std::size_t begin = search(name), end = search(name + 1);
+  return std::span(memory_).subspan(first_number() + kNumbers * begin, kNumbers * (end - begin));
 }
 
 std::span<const double> BodyContacts::remembered(std::size_t touch) const {
-  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) {
-    const auto pair = static_cast<std::size_t>(memory_[at]) - 1;
-    if (pair == touches_[touch].pair && memory_[at + 1] == half_of(touches_[touch].feature, 0) && memory_[at + 2] == half_of(touches_[touch].feature, 1)) return std::span(memory_).subspan(at, kNumbers);
+  const std::span<const double> of_pair = remembered_of_pair(touches_[touch].pair);
+  for (std::size_t at = 0; at < of_pair.size(); at += kNumbers) {
+    if (of_pair[at + 1] == half_of(touches_[touch].feature, 0) && of_pair[at + 2] == half_of(touches_[touch].feature, 1)) return of_pair.subspan(at, kNumbers);
   }
   return {};
 }
@@ -153,10 +194,9 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
     step.stiffness = 0;
     return step.law;
   }
-  double borne = 0;  // the deepest of its pair
-  for (std::size_t one = first_number(); one < memory_.size() && memory_[one] != 0; one += kNumbers) {
-    if (static_cast<std::size_t>(memory_[one]) - 1 == at.pair) borne = std::max(borne, memory_[one + kDepth]);
-  }
+  const std::span<const double> of_pair = remembered_of_pair(at.pair);
+  double borne = 0;  // the deepest of it
+  for (std::size_t one = 0; one < of_pair.size(); one += kNumbers) borne = std::max(borne, of_pair[one + kDepth]);
   const double gap = std::min(0.0, at.gap);
   step.spring_lift = std::max(0.0, -gap - borne - h * kRecoverySpeed);
   const double spring = step.law.stiffness, damper = h * material.damping;
@@ -203,7 +243,7 @@ void BodyContacts::remember() {
     std::ranges::copy(numbers, memory_.begin() + static_cast<std::ptrdiff_t>(at));
     at += kNumbers;
   }
-  std::fill(memory_.begin() + static_cast<std::ptrdiff_t>(at), memory_.end(), 0.0);
+  for (; at < memory_.size() && memory_[at] != 0; at += kNumbers) std::fill_n(memory_.begin() + static_cast<std::ptrdiff_t>(at), kNumbers, 0.0);
 }
 
 }  // namespace linden

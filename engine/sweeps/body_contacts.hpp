@@ -28,6 +28,7 @@
 
 #include "engine/effects/step_impulses.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
+#include "kernels/collision/broad_phase.hpp"
 #include "layout/body_constants.hpp"
 #include "layout/effects/contact.hpp"
 #include "layout/field.hpp"
@@ -117,9 +118,13 @@ class BodyContacts {
   /// Those of what is remembered of the last step.
   double stored_of_last() const;
   Vec3<double> force_on_b(std::size_t touch) const;
-  /// Its numbers in the memory; none.
+  /// What is remembered of a pair's contacts, one after the other; of one of them, or nothing.
+  std::span<const double> remembered_of_pair(std::size_t pair) const;
   std::span<const double> remembered(std::size_t touch) const;
   std::size_t first_number() const { return 1 + 3 * contact_.shapes.size(); }
+  /// A number of the effect's pairs; none: their number.
+  std::size_t number_of(std::uint32_t a, std::uint32_t b) const;
+  void add(std::size_t pair, double margin, const Field<double, 12>& pose);
 
   const PairContact& contact_;
   std::vector<double> lighter_;  // of each pair, of both bodies [kg]
@@ -130,8 +135,12 @@ class BodyContacts {
   std::vector<double> memory_;  // what is stored, middles of shapes at the beginning of the last step, what each contact bore
   std::vector<double> reach_;   // of each shape, from its middle [m]
   std::vector<Pose> poses_;     // of each shape, in the world
+  std::vector<std::size_t> first_pair_;  // of each shape, of those that it is the first of
+  std::vector<double> near_;    // of each shape, half of what it may be apart from another to be looked at, whatever they do [m]
   std::vector<double> moved_;   // scratch: how far in the last step [m]
-  std::size_t coupled_ = 0;     // contacts that there were the last time
+  std::vector<Bounds> bounds_;  // likewise
+  BroadPhase broad_phase_;
+  bool changed_ = false;        // contacts are others than those of the last time
 };
 
 }  // namespace linden

@@ -6,16 +6,21 @@
 //   up, down  what comes of both to the body where they close: b, and S^-1 y^T
 //
 //   S = across . columns,   rho = S^-1 (across . u - g),   dlambda = rho - down eta,   the body gets b rho less, and feels b down more
+//
+// Rows of contacts are not in this factor, nor is S of them ever formed: they are solved for by their laws (kernels/couplings/contact_solve.hpp), from
+// across and columns (product_of), and are nothing where all else is held open.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "engine/sweeps/coupling_rows.hpp"
 #include "engine/sweeps/coupling_ties.hpp"
+#include "kernels/couplings/contact_solve.hpp"
 #include "kernels/couplings/impulse_along_up.hpp"
 #include "kernels/couplings/masked_solve.hpp"
 #include "kernels/tree/mimic.hpp"
@@ -35,11 +40,11 @@ class ClosureFactors {
     if (rows.empty()) return;
     bias_.allocate(model.tree.shape.slots);
     std::size_t most = 0;
-    for (const Closure& closure : closures()) most = std::max(most, closure.rows.size());
+    for (const Closure& closure : closures()) most = std::max(most, closure.lasting_rows);
     right_sides_.resize(most, Pack(0.0));
     rho_.assign(rows.count(), S(0.0));
     for (std::vector<S>* each : {&across_, &columns_}) each->assign(paths().numbers(), S(0.0));
-    for (const Closure& closure : closures()) factors_.emplace_back(closure.rows.size(), closure.touches);
+    for (const Closure& closure : closures()) factors_.emplace_back(closure.rows.size(), closure.lasting_rows);
   }
 
   /// Once joints beyond the body where it closes have been taken out, with these gains; ties: factored. jacobian: J of rows; here and arrives: how
@@ -62,7 +67,7 @@ class ClosureFactors {
   /// Of each row: before the first half of a solve -g, or whatever it is to open by.
   std::vector<S>& rho() { return rho_; }
   /// In the first half of a solve, whose innovation, u of r, is that of the bodies beyond: rho, and of the bias, what was passed up to bodies, that
-  /// of the body where it closes. touch(rows, S, right side): where contacts are among its rows, whether it has turned the right side into what
+  /// of the body where it closes. touch(closure, right side): where contacts are among its rows, whether it has turned the right side into what
   /// fulfils their laws.
   template <class Touch>
   void yield(std::size_t closure, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias, const Touch& touch) {
@@ -85,7 +90,10 @@ class ClosureFactors {
         });
       }
     }
-    if (!closes.touches || !touch(closes.rows, kept.product, kept.right_side)) solve(closure, kept.right_side.data());
+    if (!closes.touches() || !touch(closure, kept.right_side)) {
+      solve(closure, kept.right_side.data());
+      std::fill(kept.right_side.begin() + static_cast<std::ptrdiff_t>(closes.lasting_rows), kept.right_side.end(), S(0.0));
+    }
     for (std::size_t k = 0; k < closes.rows.size(); ++k) rho_[closes.rows[k]] = kept.right_side[k];
     if (closes.slot == 0) return;
     for (int c = 0; c < 6; ++c) {
@@ -120,11 +128,42 @@ class ClosureFactors {
     }
   }
 
-  /// Of the factor made last: 1 / pivot of a row, zero where it is held already; the pivot; how far a unit of impulse along a row opens it, times its
+  /// What rows of a closure make of motions and impulses of joints, of closures that are passed, and of coordinates that are tied.
+  ContactSolve::Product product_of(std::size_t closure) const {
+    const Closure& closes = closures()[closure];
+    ContactSolve::Product product;
+    std::map<std::pair<bool, Index>, std::size_t> group_of;  // of a joint's slot; of a closure that is passed
+    const auto group = [&](bool passed, Index number, std::size_t size) {
+      const auto [found, is_new] = group_of.try_emplace({passed, number}, product.groups.size());
+      if (is_new) product.groups.push_back({size, passed});
+      return found->second;
+    };
+    for (const std::size_t k : closes.paths) {
+      const CouplingPath& path = paths().all()[k];
+      const std::size_t first_term = product.terms.size();
+      const auto add = [&](std::size_t of, std::size_t number) {
+        const std::size_t at = path.first_number + number * path.room;
+        product.terms.push_back({of, &across_[at], &columns_[at], path.room, 1});
+      };
+      for (const CouplingPath::Joint& joint : path.joints) {
+        add(group(false, joint.slot, static_cast<std::size_t>(velocity_count(model_.tree.kind(joint.slot)))), static_cast<std::size_t>(joint.at));
+      }
+      for (const CouplingPath::Passed& passed : path.passed) {
+        add(group(true, static_cast<Index>(passed.closure), closures()[passed.closure].rows.size()), passed.at);
+      }
+      if (ties_.coordinates() > 0) {
+        product.terms.push_back({group(false, 0, ties_.coordinates()), ties_.across(path.first_row), ties_.column(path.first_row), 1, ties_.coordinates()});
+      }
+      product.blocks.push_back({path.first_in_closure, path.rows(), first_term, product.terms.size(), is_contact(path.coupling->kind)});
+    }
+    return product;
+  }
+
+  /// Of the factor made last: 1 / pivot of a row, zero where it is held already, or a contact's; the pivot; how far a unit of impulse along a row opens it, times its
   /// scale squared, loops beyond closed and others open.
-  const S& inverse(std::size_t row) const {
+  S inverse(std::size_t row) const {
     const auto [factor, k] = place_of(row);
-    return factor->solve.inverse(k);
+    return factor->inverse(k);
   }
   const S& pivot(std::size_t row) const {
     const auto [factor, k] = place_of(row);
@@ -148,7 +187,7 @@ class ClosureFactors {
   void each_row(const Visit& visit) const {
     for (std::size_t closure = 0; closure < factors_.size(); ++closure) {
       const std::vector<std::size_t>& rows = closures()[closure].rows;
-      for (std::size_t k = 0; k < rows.size(); ++k) visit(rows[k], factors_[closure].solve.inverse(k), factors_[closure].moved_by_itself[k]);
+      for (std::size_t k = 0; k < rows.size(); ++k) visit(rows[k], factors_[closure].inverse(k), factors_[closure].moved_by_itself[k]);
     }
   }
 
@@ -157,14 +196,16 @@ class ClosureFactors {
 
   /// Of the rows that close together.
   struct ClosureFactor {
-    ClosureFactor(std::size_t rows, bool touches)
-        : solve(rows), fresh(rows), moved_by_itself(rows, S(0.0)), up(kSix * rows, S(0.0)), down(kSix * rows, S(0.0)), right_side(rows, S(0.0)),
-          product(touches ? rows * rows : 0, S(0.0)) {}
-    MaskedSolve<S> solve, fresh;
+    ClosureFactor(std::size_t rows, std::size_t lasting_rows)
+        : solve(lasting_rows), fresh(lasting_rows), moved_by_itself(rows, S(0.0)), up(kSix * rows, S(0.0)), down(kSix * rows, S(0.0)),
+          right_side(rows, S(0.0)), lasting(lasting_rows) {}
+    S inverse(std::size_t k) const { return k < lasting ? solve.inverse(k) : S(0.0); }
+
+    MaskedSolve<S> solve, fresh;     // of rows that are no contact's
     std::vector<S> moved_by_itself;  // diagonal of S, scaled
     std::vector<S> up, down;         // b of each column, S^-1 y^T
     std::vector<S> right_side;       // scratch
-    std::vector<S> product;          // S, where contacts are among the rows
+    std::size_t lasting;             // rows that are no contact's
   };
 
   const CouplingPaths& paths() const { return rows_.paths(); }
@@ -268,7 +309,7 @@ class ClosureFactors {
   void way_up(const CouplingPath& path, const BodyConstants<Element>& constants, const PlacementOf& placement_of, const Field<S, 6>& gain,
               const Given& given, const Past& past, const Keep& keep) {
     auto next = path.passed.begin();
-    std::size_t meeting = closures()[path.closure].paths.size();
+    std::size_t meeting = path.met_in_closure;
     impulse_along_up(
         model_.tree, constants, placement_of, gain, path.slots, path.closes_at,
         [&](Index slot) {
@@ -306,13 +347,13 @@ class ClosureFactors {
   /// S^-1 of right sides of a closure, in place; R: S, or several of them in lanes.
   template <class R>
   void solve(std::size_t closure, R* right_sides) const {
-    const std::vector<std::size_t>& rows = closures()[closure].rows;
+    const auto rows = std::span(closures()[closure].rows).first(closures()[closure].lasting_rows);
     for (std::size_t k = 0; k < rows.size(); ++k) right_sides[k] = R(rows_.scales()[rows[k]]) * right_sides[k];
     factors_[closure].solve.solve(right_sides);
     for (std::size_t k = 0; k < rows.size(); ++k) right_sides[k] = R(rows_.scales()[rows[k]]) * right_sides[k];
   }
 
-  /// S of the rows of a closure, scaled, from rows and columns, and its factor; y^T becomes S^-1 y^T.
+  /// S of the rows of a closure, scaled, from rows and columns, and its factor; y^T becomes S^-1 y^T. Of contacts no more than the diagonal.
   template <class Added>
   void factor(std::size_t closure, const Mask& lanes, const Added& added) {
     const Closure& closes = closures()[closure];
@@ -320,7 +361,11 @@ class ClosureFactors {
     const std::vector<S>& scale = rows_.scales();
     for (const std::size_t k : closes.paths) {
       const CouplingPath& path = paths().all()[k];
-      for (std::size_t m = 0; m < closes.paths.size(); ++m) {
+      if (is_contact(path.coupling->kind)) {
+        find_diagonal(path, lanes, kept.moved_by_itself);
+        continue;
+      }
+      for (std::size_t m = 0; m < path.met_in_closure; ++m) {
         const CouplingPath::Meeting& meeting = path.meetings[m];
         const CouplingPath& other = paths().all()[meeting.path];
         for (std::size_t first = 0; first < other.rows(); first += Side::count) {
@@ -338,13 +383,12 @@ class ClosureFactors {
               const S whole = product + ties_.product(row, column);
               const std::size_t at_row = path.first_in_closure + j, at_column = other.first_in_closure + c;
               kept.fresh.at(at_row, at_column) = scale[row] * (scale[column] * whole);
-              if (closes.touches) kept.product[at_row * closes.rows.size() + at_column] = whole;
             });
           }
         }
       }
     }
-    for (std::size_t j = 0; j < closes.rows.size(); ++j) {
+    for (std::size_t j = 0; j < closes.lasting_rows; ++j) {
       const std::size_t row = closes.rows[j];
       S& diagonal = kept.fresh.at(j, j);
       kept.moved_by_itself[j] = select(lanes, diagonal, kept.moved_by_itself[j]);
@@ -357,6 +401,19 @@ class ClosureFactors {
       for (std::size_t j = 0; j < closes.rows.size(); ++j) right_sides_[j] = Side::load(&kept.down[kSix * j + c]);
       solve(closure, right_sides_.data());
       for (std::size_t j = 0; j < closes.rows.size(); ++j) Side::store(lanes, right_sides_[j], &kept.down[kSix * j + c]);
+    }
+  }
+  /// Of S, scaled, of a path's rows.
+  void find_diagonal(const CouplingPath& path, const Mask& lanes, std::vector<S>& diagonal) const {
+    for (std::size_t j = 0; j < path.rows(); ++j) {
+      const std::size_t row = path.first_row + j;
+      S sum = ties_.product(row, row);
+      for (std::size_t n = 0; n < path.numbers; ++n) {
+        const std::size_t at = path.first_number + n * path.room + j;
+        sum = sum + across_[at] * columns_[at];
+      }
+      S& number = diagonal[path.first_in_closure + j];
+      number = select(lanes, rows_.scales()[row] * (rows_.scales()[row] * sum), number);
     }
   }
   /// b S^-1 y^T.

@@ -36,14 +36,14 @@ double operations_of(const Model& model, const CouplingPaths& paths, const Closu
     for (const CouplingPath::Joint& joint : path.joints) {
       a_row += past_joint(velocity_count(model.tree.kind(joint.slot)), model.tree.parent(joint.slot) == 0);
     }
-    std::size_t meeting = closure.paths.size();
+    std::size_t meeting = path.met_in_closure;
     for (const CouplingPath::Passed& passed : path.passed) {
       const Closure& below = paths.closures()[passed.closure];
       const auto rows = static_cast<double>(below.rows.size());
       for (const std::size_t other : below.paths) a_row += 2 * products(path.meetings[meeting++], paths.all()[other]);
       a_row += solve(rows) + 2 * kWrench * rows;
     }
-    for (std::size_t m = 0; m < closure.paths.size(); ++m) a_row += products(path.meetings[m], paths.all()[path.meetings[m].path]);
+    for (std::size_t m = 0; m < path.met_in_closure; ++m) a_row += products(path.meetings[m], paths.all()[path.meetings[m].path]);
     sum += static_cast<double>(path.rows()) * a_row;
   }
   const auto rows = static_cast<double>(closure.rows.size());

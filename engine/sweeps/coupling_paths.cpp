@@ -303,7 +303,7 @@ void CouplingPaths::close(const Model& model) {
   std::vector<std::size_t> number_of(paths_.size());  // of the closure that a leader's set is
   for (const std::size_t leader : leaders) {
     number_of[leader] = closures_.size();
-    closures_.push_back({paths_[leader].closes_at, {}, {}, false});
+    closures_.push_back({paths_[leader].closes_at, {}, {}, 0});
   }
   std::map<Index, std::vector<std::size_t>> closures_through;  // joint -> closures with a path through it
   for (std::size_t k = 0; k < paths_.size(); ++k) {
@@ -311,7 +311,7 @@ void CouplingPaths::close(const Model& model) {
     paths_[k].closure = number;
     paths_[k].first_in_closure = closures_[number].rows.size();
     closures_[number].paths.push_back(k);
-    closures_[number].touches = closures_[number].touches || is_contact(paths_[k].coupling->kind);
+    if (!is_contact(paths_[k].coupling->kind)) closures_[number].lasting_rows += paths_[k].rows();
     for (std::size_t row = paths_[k].first_row; row < paths_[k].last_row; ++row) closures_[number].rows.push_back(row);
     for (const CouplingPath::Joint& joint : paths_[k].joints) {
       std::vector<std::size_t>& through = closures_through[joint.slot];
@@ -336,9 +336,13 @@ void CouplingPaths::close(const Model& model) {
   for (std::size_t k = 0; k < paths_.size(); ++k) {
     CouplingPath& path = paths_[k];
     const auto meet = [&](const Closure& closure) {
-      for (const std::size_t other : closure.paths) path.meetings.push_back({other, shared_of(model, closures_, path, paths_[other])});
+      for (const std::size_t other : closure.paths) {
+        if (is_contact(paths_[other].coupling->kind)) break;
+        path.meetings.push_back({other, shared_of(model, closures_, path, paths_[other])});
+      }
     };
-    meet(closures_[path.closure]);
+    if (!is_contact(path.coupling->kind)) meet(closures_[path.closure]);
+    path.met_in_closure = path.meetings.size();
     for (const CouplingPath::Passed& one : path.passed) meet(closures_[one.closure]);
   }
 }

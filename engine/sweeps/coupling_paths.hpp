@@ -60,7 +60,9 @@ struct CouplingPath {
   std::vector<Passed> passed;         // in the order of a way up
   std::size_t velocities, on_path;    // of all joints; of those up to the last that moves b against a
   std::size_t numbers;                // velocities, and rows of closures that are passed
-  std::vector<Meeting> meetings;      // with those of its closure, itself too, in their order; then with those of each closure that is passed
+  std::vector<Meeting> meetings;      // not with contacts: with those of its closure, itself too, in their order, which a contact's does not have; then
+                                      // with those of each closure that is passed
+  std::size_t met_in_closure;         // how many of them are of its closure
   std::vector<std::size_t> terms;     // of a gear, or of a cable its length: where the velocity of each term is
   Index closes_at;                    // body, 0: the world
   std::size_t closure;                // number of the one it closes in
@@ -77,8 +79,10 @@ struct CouplingPath {
 struct Closure {
   Index slot;                      // of the body, 0: the world
   std::vector<std::size_t> paths;
-  std::vector<std::size_t> rows;   // of all rows, path by path
-  bool touches = false;            // some are of a contact
+  std::vector<std::size_t> rows;   // of all rows, path by path; those of contacts come last
+  std::size_t lasting_rows = 0;    // that are no contact's
+
+  bool touches() const { return lasting_rows < rows.size(); }
 };
 
 /// Where couplings close.

@@ -18,7 +18,7 @@
 //            down: push(): dlambda = rho - S^-1 y^T eta, joints below get u of r - G^T dlambda, then the tree's sweep to the next (down_from_closures)
 //
 // A loop costs what its path does, wherever it hangs: a ladder of a thousand cells, each closing at the one above, is solved in O(n). What closes
-// at the world is solved by one dense matrix, over the paths.
+// at the world is solved by one dense matrix a set of them that share joints, over the paths; contacts, which all close there, by a sparse one.
 //
 // Multipliers are carried times h, like all impulses of a step. The residual is linear in them, so what they begin with changes no correction that
 // is made with a factor of the step itself: they begin at zero. A factor of an earlier step pushes along where rows were then, and is wrong by
@@ -35,6 +35,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <type_traits>
@@ -83,6 +84,7 @@ class CouplingSweeps {
     }
     if (gives_way()) ends_.allocate(model.tree.shape.velocities, S(0.0));
     if (!contacts.empty()) guess_.assign(rows(), S(0.0));
+    if constexpr (std::is_same_v<S, double>) prepare_contacts();
   }
 
   CouplingSweeps(const CouplingSweeps&) = delete;
@@ -172,11 +174,12 @@ class CouplingSweeps {
     const auto added = [&](std::size_t row) {
       const S& scale = rows_.scales()[row];
       if (is_rigid(row)) return as<S>(damping);
-      return touches(row) ? as<S>(kInfinite) : as<S>(damping) + scale * scale * as<S>(springs_.yield(of, row));
+      return as<S>(damping) + scale * scale * as<S>(springs_.yield(of, row));
     };
     const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
     ClosureFactors<S, Pack>& factors = factors_of(of);
     made_last_ = &factors;
+    if (closure < contact_solves_.size() && contact_solves_[closure]) contact_solves_[closure]->renew();
     for (const std::size_t k : closures()[closure].paths) {
       if (of == Coupled::step && has_history()) keep_rows(all()[k]);
     }
@@ -199,9 +202,9 @@ class CouplingSweeps {
   /// Within up_to_closures of the first half of a solve, whose innovation, u of r, is that of the bodies beyond: of the bias, what was passed up
   /// to bodies, that of the body where it closes.
   void yield(std::size_t closure, Coupled of, MimicTies<S>& ties, const Field<S>& innovation, Field<S, 6>& bias) {
-    factors_of(of).yield(closure, ties, innovation, bias, [&](const auto& rows, const auto& product, auto& right_side) {
+    factors_of(of).yield(closure, ties, innovation, bias, [&](std::size_t touching, auto& right_side) {
       if constexpr (std::is_same_v<S, double>) {
-        if (of == Coupled::step) touch(rows, product, right_side);
+        if (of == Coupled::step) touch(touching, right_side);
       }
       return std::is_same_v<S, double> && of == Coupled::step;
     });
@@ -380,8 +383,17 @@ class CouplingSweeps {
 
   bool touches(std::size_t row) const { return row >= rows_.paths().lasting_rows(); }
   std::size_t first_of(std::size_t contact) const { return rows_.paths().lasting_rows() + 3 * contact; }
-  /// Changes of multipliers with which contacts among these rows fulfil their laws, and the others open by what they are to.
-  void touch(const std::vector<std::size_t>& rows, const std::vector<S>& product, std::vector<S>& right_side) {
+  void prepare_contacts() {
+    contact_solves_.resize(laws_.empty() ? 0 : closures().size());
+    for (std::size_t closure = 0; closure < contact_solves_.size(); ++closure) {
+      if (!closures()[closure].touches()) continue;
+      contact_solves_[closure] = std::make_unique<ContactSolve>();
+      contact_solves_[closure]->prepare(of_step_.product_of(closure));
+    }
+  }
+  /// Changes of multipliers with which contacts of a closure fulfil their laws, and its other rows open by what they are to.
+  void touch(std::size_t closure, std::vector<S>& right_side) {
+    const std::vector<std::size_t>& rows = closures()[closure].rows;
     for (std::vector<S>* numbers : {&yields_, &multipliers_, &changes_}) numbers->assign(rows.size(), S(0.0));
     firsts_.clear();
     laws_there_.clear();
@@ -397,7 +409,7 @@ class CouplingSweeps {
       firsts_.push_back(k);
       laws_there_.push_back(laws_[(row - rows_.paths().lasting_rows()) / 3]);
     }
-    contact_solve_.solve({product, yields_, firsts_, laws_there_, multipliers_, changes_}, right_side);
+    contact_solves_[closure]->solve({yields_, firsts_, laws_there_, multipliers_, changes_}, right_side);
     for (std::size_t k = 0; k < rows.size(); ++k) guess_[rows[k]] = lambda_[rows[k]] + right_side[k];
   }
 
@@ -417,7 +429,7 @@ class CouplingSweeps {
   CouplingSprings<S> springs_;
   std::vector<ContactLaw> laws_;          // of each contact
   std::vector<S> guess_;                  // of each row, the multiplier that a solve begins with
-  ContactSolve contact_solve_;
+  std::vector<std::unique_ptr<ContactSolve>> contact_solves_;  // of each closure that has contacts
   std::vector<S> yields_, multipliers_, changes_;  // scratch: of the rows that close together
   std::vector<std::size_t> firsts_;                // likewise
   std::vector<ContactLaw> laws_there_;             // likewise

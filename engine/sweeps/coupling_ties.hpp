@@ -64,6 +64,10 @@ class CouplingTies {
       }
     }
   }
+  std::size_t coordinates() const { return felt_.size(); }
+  /// Of a row: how coordinates move it, and how they move by its impulse, one after the other.
+  const S* across(std::size_t row) const { return across_.data() + row * felt_.size(); }
+  const S* column(std::size_t row) const { return columns_.data() + row * felt_.size(); }
   /// Their share of S.
   S product(std::size_t row, std::size_t column) const {
     S sum(0.0);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 namespace linden {
 namespace {
@@ -16,11 +16,15 @@ constexpr int kCalmRound = 6;
 /// Rounds end once loads change by less than this share of the largest.
 constexpr double kSteadyLoad = 1e-12;
 
-/// Corrections end once the function is to fall by this share of what contacts work on what was to happen without them.
-constexpr double kDone = 1e-24;
+/// Corrections end once the function is to fall by this share of what contacts work on what was to happen without them; of a round that is not the
+/// last, whose loads are to change, by no less than the square of a share of that change.
+constexpr double kDone = 1e-24, kFirstDone = 1e-8, kShareOfChange = 1e-2;
 
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning; to where it is this small.
 constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
+
+/// A factor serves as long as H has changed by less than this share.
+constexpr double kNearBy = 1e-3;
 
 }  // namespace
 
@@ -32,7 +36,7 @@ void ContactSolve::find_pushes(const Rows& rows, const Eigen::VectorXd& gaps) {
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(rows.first[c]);
     const ContactLaw& law = rows.laws[c];
-    const double depth = -(gaps[at + 2] + law.lift), s1 = gaps[at], s2 = gaps[at + 1], length = std::hypot(s1, s2);
+    const double depth = -(gaps[at + 2] + law.lift), s1 = gaps[at], s2 = gaps[at + 1], length = std::sqrt(s1 * s1 + s2 * s2);
     const bool slides = length > law.creep;
     const double drag = law.friction * loads_[c] > 0 ? law.friction * loads_[c] / std::max(length, law.creep) : 0;
     pushes_[at] = -drag * s1;
@@ -43,35 +47,182 @@ void ContactSolve::find_pushes(const Rows& rows, const Eigen::VectorXd& gaps) {
   }
 }
 
+void ContactSolve::prepare(Product product) {
+  product_ = std::move(product);
+  std::vector<Group> groups = product_.groups;
+  FrontalSolve::Elements elements;
+  contact_of_.clear();
+  row_group_.clear();
+  std::size_t contacts = 0, rows = 0;
+  any_linear_ = false;
+  for (const Block& block : product_.blocks) {
+    for (std::size_t t = block.first_term; t < block.last_term; ++t) elements.groups.push_back(product_.terms[t].group);
+    contact_of_.push_back(contacts);
+    row_group_.push_back(groups.size());
+    if (block.touches) {
+      ++contacts;
+    } else {
+      any_linear_ = true;
+      elements.groups.push_back(groups.size());
+      groups.push_back({block.rows, true});
+    }
+    elements.first.push_back(elements.groups.size());
+    rows = std::max(rows, block.first + block.rows);
+  }
+  frontal_.analyse(groups, elements);
+  diagonal_.resize(frontal_.unknowns());
+  motion_.resize(frontal_.unknowns());
+  for (Eigen::VectorXd* each : {&b_, &z_, &change_, &gaps_, &moved_, &tried_, &pushes_}) each->setZero(static_cast<Eigen::Index>(rows));
+  for (std::vector<Falls>* each : {&falls_, &factored_}) each->resize(contacts);
+  loads_.resize(contacts);
+  is_factored_ = false;
+}
+
+/// motion += X impulses, openings = Y motion, of a block's.
+void ContactSolve::move(const Block& block, const double* impulses, double* motion) const {
+  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+    const Term& term = product_.terms[t];
+    double* const to = motion + frontal_.first_of(term.group);
+    for (std::size_t n = 0; n < product_.groups[term.group].size; ++n) {
+      const double* const column = term.columns + n * term.number_stride;
+      double sum = 0;
+      for (std::size_t j = 0; j < block.rows; ++j) sum += column[j * term.row_stride] * impulses[j];
+      to[n] += sum;
+    }
+  }
+}
+void ContactSolve::open(const Block& block, const double* motion, double* openings) const {
+  std::fill_n(openings, block.rows, 0.0);
+  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+    const Term& term = product_.terms[t];
+    const double* const from = motion + frontal_.first_of(term.group);
+    for (std::size_t n = 0; n < product_.groups[term.group].size; ++n) {
+      const double* const row = term.across + n * term.number_stride;
+      for (std::size_t j = 0; j < block.rows; ++j) openings[j] += row[j * term.row_stride] * from[n];
+    }
+  }
+}
+
+/// openings = S impulses.
+void ContactSolve::multiply(const Eigen::VectorXd& impulses, Eigen::VectorXd& openings) {
+  std::ranges::fill(motion_, 0.0);
+  for (const Block& block : product_.blocks) move(block, &impulses[static_cast<Eigen::Index>(block.first)], motion_.data());
+  for (const Block& block : product_.blocks) open(block, motion_.data(), &openings[static_cast<Eigen::Index>(block.first)]);
+}
+
+bool ContactSolve::is_near(const Falls& factored, const Falls& now) const {
+  const double most = std::max({factored[0], factored[2], now[0], now[2]});
+  if (std::abs(factored[3] - now[3]) > kNearBy * std::min(factored[3], now[3])) return false;
+  for (const std::size_t k : {0u, 1u, 2u}) {
+    if (std::abs(factored[k] - now[k]) > kNearBy * most) return false;
+  }
+  return true;
+}
+
+/// X H Y.
+void ContactSolve::add_contact(const Block& block, const Falls& falls, double* front, std::size_t stride, const std::size_t* at) const {
+  const auto& [h11, h12, h22, h33] = falls;
+  if (h11 == 0 && h22 == 0 && h33 == 0) return;
+  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+    const Term& of_row = product_.terms[t];
+    for (std::size_t n = 0; n < product_.groups[of_row.group].size; ++n) {
+      const double* const x = of_row.columns + n * of_row.number_stride;
+      const double x1 = x[0], x2 = x[of_row.row_stride], x3 = x[2 * of_row.row_stride];
+      const double a1 = h11 * x1 + h12 * x2, a2 = h12 * x1 + h22 * x2, a3 = h33 * x3;
+      double* const row = front + (at[t - block.first_term] + n) * stride;
+      for (std::size_t u = block.first_term; u < block.last_term; ++u) {
+        const Term& of_column = product_.terms[u];
+        double* const to = row + at[u - block.first_term];
+        const double* y = of_column.across;
+        for (std::size_t m = 0; m < product_.groups[of_column.group].size; ++m, y += of_column.number_stride) {
+          to[m] += a1 * y[0] + a2 * y[of_column.row_stride] + a3 * y[2 * of_column.row_stride];
+        }
+      }
+    }
+  }
+}
+
+/// Rows that are held already stay where they are, and nothing feels them.
+void ContactSolve::add_linear(const Block& block, const Rows& rows, double* front, std::size_t stride, const std::size_t* at) const {
+  const std::size_t own = at[block.last_term - block.first_term];
+  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+    const Term& term = product_.terms[t];
+    for (std::size_t j = 0; j < block.rows; ++j) {
+      if (std::isinf(rows.yields[block.first + j])) continue;
+      for (std::size_t n = 0; n < product_.groups[term.group].size; ++n) {
+        const std::size_t number = at[t - block.first_term] + n, from = n * term.number_stride + j * term.row_stride;
+        front[number * stride + own + j] -= term.columns[from];
+        front[(own + j) * stride + number] += term.across[from];
+      }
+    }
+  }
+}
+
+void ContactSolve::factor(const Rows& rows) {
+  factored_ = falls_;
+  is_factored_ = true;
+  ++factors_;
+  std::ranges::fill(diagonal_, 1.0);
+  for (std::size_t k = 0; k < product_.blocks.size(); ++k) {
+    const Block& block = product_.blocks[k];
+    for (std::size_t j = 0; !block.touches && j < block.rows; ++j) {
+      const double yield = rows.yields[block.first + j];
+      diagonal_[frontal_.first_of(row_group_[k]) + j] = std::isinf(yield) ? 1 : yield;
+    }
+  }
+  frontal_.factor(diagonal_, [this, &rows](std::size_t k, double* front, std::size_t stride, const std::size_t* at) {
+    const Block& block = product_.blocks[k];
+    if (block.touches) return add_contact(block, factored_[contact_of_[k]], front, stride, at);
+    add_linear(block, rows, front, stride, at);
+  });
+}
+
 /// change_ from what is left of all rows.
 void ContactSolve::correct(const Rows& rows) {
-  for (std::size_t j = 0; j < linear_.size(); ++j) {
-    const auto row = static_cast<Eigen::Index>(j);
-    if (!linear_[j]) continue;
-    if (std::isinf(rows.yields[j])) {
-      matrix_.row(row).setZero();
-      matrix_(row, row) = 1;
-      change_[row] = 0;
-    } else {
-      matrix_.row(row) = product_.row(row);
-      matrix_(row, row) += rows.yields[j];
-      change_[row] = -gaps_[row] - rows.yields[j] * z_[row];
-    }
-  }
+  bool any_left = any_linear_, near = is_factored_;
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
-    const auto at = static_cast<Eigen::Index>(rows.first[c]);
-    const auto& [h11, h12, h22, h33] = falls_[c];
-    matrix_.row(at) = h11 * product_.row(at) + h12 * product_.row(at + 1);
-    matrix_.row(at + 1) = h12 * product_.row(at) + h22 * product_.row(at + 1);
-    matrix_.row(at + 2) = h33 * product_.row(at + 2);
-    for (Eigen::Index k = at; k < at + 3; ++k) {
-      matrix_(k, k) += 1;
-      change_[k] = pushes_[k] - rows.multipliers[static_cast<std::size_t>(k)] - z_[k];
+    for (std::size_t j = rows.first[c]; j < rows.first[c] + 3; ++j) {
+      const auto k = static_cast<Eigen::Index>(j);
+      change_[k] = pushes_[k] - rows.multipliers[j] - z_[k];
+      any_left = any_left || change_[k] != 0;
+    }
+    near = near && is_near(factored_[c], falls_[c]);
+  }
+  if (!any_left) {
+    moved_.setZero();
+    return;
+  }
+  if (!near) factor(rows);
+  std::ranges::fill(motion_, 0.0);
+  for (std::size_t k = 0; k < product_.blocks.size(); ++k) {
+    const Block& block = product_.blocks[k];
+    if (block.touches) {
+      move(block, &change_[static_cast<Eigen::Index>(block.first)], motion_.data());
+      continue;
+    }
+    for (std::size_t j = 0; j < block.rows; ++j) {
+      const auto row = static_cast<Eigen::Index>(block.first + j);
+      const double yield = rows.yields[block.first + j];
+      motion_[frontal_.first_of(row_group_[k]) + j] = std::isinf(yield) ? 0 : -gaps_[row] - yield * z_[row];
     }
   }
-  factor_.compute(matrix_);
-  change_ = factor_.solve(change_);
-  moved_.noalias() = product_ * change_;
+  frontal_.solve(motion_);
+  for (std::size_t k = 0; k < product_.blocks.size(); ++k) {
+    const Block& block = product_.blocks[k];
+    double* const change = &change_[static_cast<Eigen::Index>(block.first)];
+    if (!block.touches) {
+      std::copy_n(&motion_[frontal_.first_of(row_group_[k])], block.rows, change);
+      continue;
+    }
+    const auto& [h11, h12, h22, h33] = factored_[contact_of_[k]];
+    if (h11 == 0 && h22 == 0 && h33 == 0) continue;
+    double opens[3];
+    open(block, motion_.data(), opens);
+    change[0] -= h11 * opens[0] + h12 * opens[1];
+    change[1] -= h12 * opens[0] + h22 * opens[1];
+    change[2] -= h33 * opens[2];
+  }
+  multiply(change_, moved_);
 }
 
 /// With pushes_ of what this share of the correction leads to.
@@ -117,11 +268,11 @@ double ContactSolve::share_of_correction(const Rows& rows, double slope_at_begin
 /// Rows that are no contact's are fulfilled with contacts as they are: from there on every correction keeps them so, and its slope is that of contacts.
 void ContactSolve::solve_linear_rows(const Rows& rows) {
   if (!any_linear_) return;
-  gaps_.noalias() = product_ * z_;
+  multiply(z_, gaps_);
   gaps_ -= b_;
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(rows.first[c]);
-    falls_[c] = {0, 0, 0, 0};
+    falls_[c] = {};
     for (Eigen::Index k = at; k < at + 3; ++k) pushes_[k] = rows.multipliers[static_cast<std::size_t>(k)] + z_[k];
   }
   correct(rows);
@@ -129,26 +280,18 @@ void ContactSolve::solve_linear_rows(const Rows& rows) {
 }
 
 void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
-  const auto count = static_cast<Eigen::Index>(right_side.size());
-  product_ = Eigen::Map<const Matrix>(rows.product.data(), count, count);
-  b_ = Eigen::Map<const Eigen::VectorXd>(right_side.data(), count);
-  matrix_.resize(count, count);
-  for (Eigen::VectorXd* each : {&z_, &change_, &gaps_, &moved_, &tried_, &pushes_}) each->setZero(count);
-  falls_.resize(rows.first.size());
-  loads_.resize(rows.first.size());
-  linear_.assign(right_side.size(), 1);
+  std::ranges::copy(right_side, b_.begin());
+  z_.setZero();
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
-    for (std::size_t j = rows.first[c]; j < rows.first[c] + 3; ++j) {
-      linear_[j] = 0;
-      z_[static_cast<Eigen::Index>(j)] = rows.guess[j];
-    }
+    for (std::size_t j = rows.first[c]; j < rows.first[c] + 3; ++j) z_[static_cast<Eigen::Index>(j)] = rows.guess[j];
     loads_[c] = std::max(0.0, rows.multipliers[rows.first[c] + 2] + rows.guess[rows.first[c] + 2]);
   }
-  any_linear_ = std::ranges::count(linear_, 1) > 0;
+  factors_ = 0;
   solve_linear_rows(rows);
   corrections_ = 0;
+  double enough = kFirstDone;
   for (rounds_ = 1; rounds_ <= kMostLoadRounds; ++rounds_) {
-    gaps_.noalias() = product_ * z_;
+    multiply(z_, gaps_);
     gaps_ -= b_;
     for (int k = 0; k < kMostNewtonSteps; ++k) {
       find_pushes(rows, gaps_);
@@ -162,7 +305,7 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
         }
       }
       const double begin = slope(rows, 0);
-      const bool done = -begin <= kDone * work;
+      const bool done = -begin <= enough * work;
       const double share = done ? 1 : share_of_correction(rows, begin);
       z_ += share * change_;
       gaps_ += share * moved_;
@@ -178,7 +321,9 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
       if (rounds_ >= kCalmRound) load = 0.5 * (load + loads_[c]);
       loads_[c] = load;
     }
-    if (!rubs || changed <= kSteadyLoad * most) break;
+    if (enough <= kDone && (!rubs || changed <= kSteadyLoad * most)) break;
+    const double change = rubs && most > 0 ? kShareOfChange * changed / most : 0;
+    enough = std::clamp(change * change, kDone, kFirstDone);
   }
   for (std::size_t j = 0; j < right_side.size(); ++j) right_side[j] = z_[static_cast<Eigen::Index>(j)];
 }

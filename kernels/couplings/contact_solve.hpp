@@ -18,16 +18,27 @@
 //   S dz + yield dz = b - S z - yield z                                       all other rows, yield 0 where rigid; held already: z = 0
 //   slope along dz:  (lambda + z - lambda(g)) . S dz                          of the rows of contacts
 //
+// S is never formed. It is Y X, of what rows make of motions and impulses of rows of motions, each among the few joints that a row is felt by; and
+// so corrections are found by those motions, w = X dz, a sparse system (frontal_solve.hpp) in which two contacts meet where they share a joint:
+//
+//   (1 + X H Y) w - X_r dz_r = X (lambda(g) - lambda - z)                     r: rows that are no contact's
+//   Y_r w + yield dz_r = b - S z - yield z
+//   dz = lambda(g) - lambda - z - H Y w                                       contacts
+//
+// H may be that of a correction before, and the factor with it, where it has hardly changed: what it gets wrong the next correction finds.
+//
 // Without the cuts houses of cards fall: 529 of 3,000 steps fail, none with them.
 //
 // source  Castro, Permenter, Han, An Unconstrained Convex Formulation of Compliant Contact (2022); Moreau 1988 (time stepping by impulses)
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
+
+#include "kernels/couplings/frontal_solve.hpp"
 
 namespace linden {
 
@@ -47,37 +58,72 @@ class ContactSolve {
   ContactSolve(const ContactSolve&) = delete;
   ContactSolve& operator=(const ContactSolve&) = delete;
 
+  using Group = FrontalSolve::Group;
+  /// What rows have to do with the numbers of one group: that of row j, number n stands at n number_stride + j row_stride.
+  struct Term {
+    std::size_t group;
+    const double* across;   // Y
+    const double* columns;  // X
+    std::size_t number_stride, row_stride;
+  };
+  /// Rows that are felt by the same groups, each of which has one term: a contact's, or others.
+  struct Block {
+    std::size_t first, rows;
+    std::size_t first_term, last_term;
+    bool touches;
+  };
+  /// S, in the order of the rows. A group is late where Y X of its numbers is negative (frontal_solve.hpp).
+  struct Product {
+    std::vector<Group> groups;
+    std::vector<Block> blocks;
+    std::vector<Term> terms;
+  };
+  /// Numbers of its terms may change from then on, and stay where they are.
+  void prepare(Product product);
+  /// They have.
+  void renew() { is_factored_ = false; }
+
   struct Rows {
-    std::span<const double> product;        // S, row by row
     std::span<const double> yields;         // of each row beside its bodies; of a contact's 0; infinite: held already
     std::span<const std::size_t> first;     // of each contact, its first row
     std::span<const ContactLaw> laws;       // of each contact
     std::span<const double> multipliers;    // of each row, before the solve
     std::span<const double> guess;          // changes to begin with, of rows of contacts
   };
-  /// b -> z: how far each row is to open -> by how much its multiplier changes. Allocates where there are more rows than ever.
+  /// b -> z: how far each row is to open -> by how much its multiplier changes. Allocates nothing.
   void solve(const Rows& rows, std::span<double> right_side);
-  /// Rounds and corrections of the solve made last.
+  /// Of the solve made last.
   int rounds() const { return rounds_; }
   int corrections() const { return corrections_; }
+  int factors() const { return factors_; }
 
  private:
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  using Falls = std::array<double, 4>;
+  void multiply(const Eigen::VectorXd& impulses, Eigen::VectorXd& openings);
+  void move(const Block& block, const double* impulses, double* motion) const;
+  void open(const Block& block, const double* motion, double* openings) const;
   void solve_linear_rows(const Rows& rows);
   void find_pushes(const Rows& rows, const Eigen::VectorXd& gaps);
   void correct(const Rows& rows);
+  bool is_near(const Falls& factored, const Falls& now) const;
+  void factor(const Rows& rows);
+  void add_contact(const Block& block, const Falls& falls, double* front, std::size_t stride, const std::size_t* at) const;
+  void add_linear(const Block& block, const Rows& rows, double* front, std::size_t stride, const std::size_t* at) const;
   double slope(const Rows& rows, double share) const;
   double share_of_correction(const Rows& rows, double slope_at_begin);
 
-  Matrix product_, matrix_;
+  Product product_;
+  std::vector<std::size_t> contact_of_;         // of each block that touches, which
+  std::vector<std::size_t> row_group_;          // of each other block, the group that its rows are
+  FrontalSolve frontal_;
+  std::vector<double> diagonal_, motion_;       // of each unknown
   Eigen::VectorXd b_, z_, change_, gaps_, moved_, tried_;
   Eigen::VectorXd pushes_;                      // of rows of contacts
-  std::vector<std::array<double, 4>> falls_;    // of each contact H: across 11, 12, 22; along the normal
+  std::vector<Falls> falls_;                    // of each contact H: across 11, 12, 22; along the normal
+  std::vector<Falls> factored_;                 // that the factor was made with
   std::vector<double> loads_;                   // N of each contact, times h^2
-  std::vector<char> linear_;                    // rows that are no contact's
-  Eigen::PartialPivLU<Matrix> factor_;
-  bool any_linear_ = false;
-  int rounds_ = 0, corrections_ = 0;
+  bool any_linear_ = false, is_factored_ = false;
+  int rounds_ = 0, corrections_ = 0, factors_ = 0;
 };
 
 }  // namespace linden
