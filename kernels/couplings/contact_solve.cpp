@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace linden {
@@ -25,6 +26,13 @@ constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
 
 /// A factor serves as long as H has changed by less than this share.
 constexpr double kNearBy = 1e-3;
+
+/// action(size), which is known to the compiler where it is that of a free body.
+template <class Action>
+void with_size(std::size_t size, const Action& action) {
+  if (size == 6) return action(std::integral_constant<std::size_t, 6>());
+  action(size);
+}
 
 }  // namespace
 
@@ -107,9 +115,11 @@ void ContactSolve::move(const Block& block, const double* impulses, double* moti
     const std::size_t group = product_.terms[t].group, size = product_.groups[group].size;
     double* const to = motion + frontal_.first_of(group);
     const double* column = &columns_[first_number_[t]];
-    for (std::size_t j = 0; j < block.rows; ++j, column += size) {
-      for (std::size_t n = 0; n < size; ++n) to[n] += column[n] * impulses[j];
-    }
+    with_size(size, [&](auto numbers) {
+      for (std::size_t j = 0; j < block.rows; ++j, column += numbers) {
+        for (std::size_t n = 0; n < numbers; ++n) to[n] += column[n] * impulses[j];
+      }
+    });
   }
 }
 void ContactSolve::open(const Block& block, const double* motion, double* openings) const {
@@ -118,11 +128,13 @@ void ContactSolve::open(const Block& block, const double* motion, double* openin
     const std::size_t group = product_.terms[t].group, size = product_.groups[group].size;
     const double* const from = motion + frontal_.first_of(group);
     const double* row = &across_[first_number_[t]];
-    for (std::size_t j = 0; j < block.rows; ++j, row += size) {
-      double sum = 0;
-      for (std::size_t n = 0; n < size; ++n) sum += row[n] * from[n];
-      openings[j] += sum;
-    }
+    with_size(size, [&](auto numbers) {
+      for (std::size_t j = 0; j < block.rows; ++j, row += numbers) {
+        double sum = 0;
+        for (std::size_t n = 0; n < numbers; ++n) sum += row[n] * from[n];
+        openings[j] += sum;
+      }
+    });
   }
 }
 
@@ -156,7 +168,9 @@ void ContactSolve::add_contact(const Block& block, const Falls& falls, double* f
         const std::size_t width = product_.groups[product_.terms[u].group].size;
         const double *const y1 = &across_[first_number_[u]], *const y2 = y1 + width, *const y3 = y2 + width;
         double* const to = row + at[u - block.first_term];
-        for (std::size_t m = 0; m < width; ++m) to[m] += a1 * y1[m] + a2 * y2[m] + a3 * y3[m];
+        with_size(width, [&](auto numbers) {
+          for (std::size_t m = 0; m < numbers; ++m) to[m] += a1 * y1[m] + a2 * y2[m] + a3 * y3[m];
+        });
       }
     }
   }
