@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace linden {
@@ -25,6 +26,13 @@ constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
 
 /// A factor serves as long as H has changed by less than this share.
 constexpr double kNearBy = 1e-3;
+
+/// action(size), which is known to the compiler where it is that of a free body.
+template <class Action>
+void with_size(std::size_t size, const Action& action) {
+  if (size == 6) return action(std::integral_constant<std::size_t, 6>());
+  action(size);
+}
 
 }  // namespace
 
@@ -53,10 +61,15 @@ void ContactSolve::prepare(Product product) {
   FrontalSolve::Elements elements;
   contact_of_.clear();
   row_group_.clear();
-  std::size_t contacts = 0, rows = 0;
+  first_number_.resize(product_.terms.size());
+  std::size_t contacts = 0, rows = 0, numbers = 0;
   any_linear_ = false;
   for (const Block& block : product_.blocks) {
-    for (std::size_t t = block.first_term; t < block.last_term; ++t) elements.groups.push_back(product_.terms[t].group);
+    for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+      elements.groups.push_back(product_.terms[t].group);
+      first_number_[t] = numbers;
+      numbers += block.rows * groups[product_.terms[t].group].size;
+    }
     contact_of_.push_back(contacts);
     row_group_.push_back(groups.size());
     if (block.touches) {
@@ -75,31 +88,53 @@ void ContactSolve::prepare(Product product) {
   for (Eigen::VectorXd* each : {&b_, &z_, &change_, &gaps_, &moved_, &tried_, &pushes_}) each->setZero(static_cast<Eigen::Index>(rows));
   for (std::vector<Falls>* each : {&falls_, &factored_}) each->resize(contacts);
   loads_.resize(contacts);
-  is_factored_ = false;
+  for (std::vector<double>* each : {&across_, &columns_}) each->resize(numbers);
+  renew();
+}
+
+void ContactSolve::read() {
+  if (is_read_) return;
+  is_read_ = true;
+  for (const Block& block : product_.blocks) {
+    for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+      const Term& term = product_.terms[t];
+      std::size_t to = first_number_[t];
+      for (std::size_t j = 0; j < block.rows; ++j) {
+        for (std::size_t n = 0; n < product_.groups[term.group].size; ++n, ++to) {
+          across_[to] = term.across[n * term.number_stride + j * term.row_stride];
+          columns_[to] = term.columns[n * term.number_stride + j * term.row_stride];
+        }
+      }
+    }
+  }
 }
 
 /// motion += X impulses, openings = Y motion, of a block's.
 void ContactSolve::move(const Block& block, const double* impulses, double* motion) const {
   for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const Term& term = product_.terms[t];
-    double* const to = motion + frontal_.first_of(term.group);
-    for (std::size_t n = 0; n < product_.groups[term.group].size; ++n) {
-      const double* const column = term.columns + n * term.number_stride;
-      double sum = 0;
-      for (std::size_t j = 0; j < block.rows; ++j) sum += column[j * term.row_stride] * impulses[j];
-      to[n] += sum;
-    }
+    const std::size_t group = product_.terms[t].group, size = product_.groups[group].size;
+    double* const to = motion + frontal_.first_of(group);
+    const double* column = &columns_[first_number_[t]];
+    with_size(size, [&](auto numbers) {
+      for (std::size_t j = 0; j < block.rows; ++j, column += numbers) {
+        for (std::size_t n = 0; n < numbers; ++n) to[n] += column[n] * impulses[j];
+      }
+    });
   }
 }
 void ContactSolve::open(const Block& block, const double* motion, double* openings) const {
   std::fill_n(openings, block.rows, 0.0);
   for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const Term& term = product_.terms[t];
-    const double* const from = motion + frontal_.first_of(term.group);
-    for (std::size_t n = 0; n < product_.groups[term.group].size; ++n) {
-      const double* const row = term.across + n * term.number_stride;
-      for (std::size_t j = 0; j < block.rows; ++j) openings[j] += row[j * term.row_stride] * from[n];
-    }
+    const std::size_t group = product_.terms[t].group, size = product_.groups[group].size;
+    const double* const from = motion + frontal_.first_of(group);
+    const double* row = &across_[first_number_[t]];
+    with_size(size, [&](auto numbers) {
+      for (std::size_t j = 0; j < block.rows; ++j, row += numbers) {
+        double sum = 0;
+        for (std::size_t n = 0; n < numbers; ++n) sum += row[n] * from[n];
+        openings[j] += sum;
+      }
+    });
   }
 }
 
@@ -124,19 +159,18 @@ void ContactSolve::add_contact(const Block& block, const Falls& falls, double* f
   const auto& [h11, h12, h22, h33] = falls;
   if (h11 == 0 && h22 == 0 && h33 == 0) return;
   for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const Term& of_row = product_.terms[t];
-    for (std::size_t n = 0; n < product_.groups[of_row.group].size; ++n) {
-      const double* const x = of_row.columns + n * of_row.number_stride;
-      const double x1 = x[0], x2 = x[of_row.row_stride], x3 = x[2 * of_row.row_stride];
-      const double a1 = h11 * x1 + h12 * x2, a2 = h12 * x1 + h22 * x2, a3 = h33 * x3;
+    const std::size_t size = product_.groups[product_.terms[t].group].size;
+    const double* const x = &columns_[first_number_[t]];
+    for (std::size_t n = 0; n < size; ++n) {
+      const double x1 = x[n], x2 = x[size + n], a1 = h11 * x1 + h12 * x2, a2 = h12 * x1 + h22 * x2, a3 = h33 * x[2 * size + n];
       double* const row = front + (at[t - block.first_term] + n) * stride;
       for (std::size_t u = block.first_term; u < block.last_term; ++u) {
-        const Term& of_column = product_.terms[u];
+        const std::size_t width = product_.groups[product_.terms[u].group].size;
+        const double *const y1 = &across_[first_number_[u]], *const y2 = y1 + width, *const y3 = y2 + width;
         double* const to = row + at[u - block.first_term];
-        const double* y = of_column.across;
-        for (std::size_t m = 0; m < product_.groups[of_column.group].size; ++m, y += of_column.number_stride) {
-          to[m] += a1 * y[0] + a2 * y[of_column.row_stride] + a3 * y[2 * of_column.row_stride];
-        }
+        with_size(width, [&](auto numbers) {
+          for (std::size_t m = 0; m < numbers; ++m) to[m] += a1 * y1[m] + a2 * y2[m] + a3 * y3[m];
+        });
       }
     }
   }
@@ -146,13 +180,13 @@ void ContactSolve::add_contact(const Block& block, const Falls& falls, double* f
 void ContactSolve::add_linear(const Block& block, const Rows& rows, double* front, std::size_t stride, const std::size_t* at) const {
   const std::size_t own = at[block.last_term - block.first_term];
   for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const Term& term = product_.terms[t];
+    const std::size_t size = product_.groups[product_.terms[t].group].size;
     for (std::size_t j = 0; j < block.rows; ++j) {
       if (std::isinf(rows.yields[block.first + j])) continue;
-      for (std::size_t n = 0; n < product_.groups[term.group].size; ++n) {
-        const std::size_t number = at[t - block.first_term] + n, from = n * term.number_stride + j * term.row_stride;
-        front[number * stride + own + j] -= term.columns[from];
-        front[(own + j) * stride + number] += term.across[from];
+      for (std::size_t n = 0; n < size; ++n) {
+        const std::size_t number = at[t - block.first_term] + n, from = first_number_[t] + j * size + n;
+        front[number * stride + own + j] -= columns_[from];
+        front[(own + j) * stride + number] += across_[from];
       }
     }
   }
@@ -280,6 +314,7 @@ void ContactSolve::solve_linear_rows(const Rows& rows) {
 }
 
 void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
+  read();
   std::ranges::copy(right_side, b_.begin());
   z_.setZero();
   for (std::size_t c = 0; c < rows.first.size(); ++c) {

@@ -81,7 +81,7 @@ class ContactSolve {
   /// Numbers of its terms may change from then on, and stay where they are.
   void prepare(Product product);
   /// They have.
-  void renew() { is_factored_ = false; }
+  void renew() { is_factored_ = is_read_ = false; }
 
   struct Rows {
     std::span<const double> yields;         // of each row beside its bodies; of a contact's 0; infinite: held already
@@ -99,6 +99,7 @@ class ContactSolve {
 
  private:
   using Falls = std::array<double, 4>;
+  void read();
   void multiply(const Eigen::VectorXd& impulses, Eigen::VectorXd& openings);
   void move(const Block& block, const double* impulses, double* motion) const;
   void open(const Block& block, const double* motion, double* openings) const;
@@ -113,6 +114,8 @@ class ContactSolve {
   double share_of_correction(const Rows& rows, double slope_at_begin);
 
   Product product_;
+  std::vector<std::size_t> first_number_;       // of each term, among the two next: row after row
+  std::vector<double> across_, columns_;        // Y and X side by side
   std::vector<std::size_t> contact_of_;         // of each block that touches, which
   std::vector<std::size_t> row_group_;          // of each other block, the group that its rows are
   FrontalSolve frontal_;
@@ -122,7 +125,7 @@ class ContactSolve {
   std::vector<Falls> falls_;                    // of each contact H: across 11, 12, 22; along the normal
   std::vector<Falls> factored_;                 // that the factor was made with
   std::vector<double> loads_;                   // N of each contact, times h^2
-  bool any_linear_ = false, is_factored_ = false;
+  bool any_linear_ = false, is_factored_ = false, is_read_ = false;
   int rounds_ = 0, corrections_ = 0, factors_ = 0;
 };
 

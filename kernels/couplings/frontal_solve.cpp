@@ -12,7 +12,7 @@ namespace linden {
 namespace {
 
 /// Unknowns that are eliminated before others see them; in fronts beyond kWide, where products of matrices pay.
-constexpr std::size_t kPanel = 8, kWidePanel = 48, kWide = 96;
+constexpr std::size_t kPanel = 6, kWidePanel = 48, kWide = 96;
 
 /// Fronts of a child and its parent become one where both eliminate no more than this, and the child's grows by this share at most.
 constexpr std::size_t kSmall = 12;
