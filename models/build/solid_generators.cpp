@@ -28,7 +28,7 @@ constexpr double kCardGap = 0.5e-3;                                    // betwee
 const Vector3d kDomino(0.01, 0.03, 0.06);                              // [m]
 constexpr double kDominoMass = 0.02, kDominoSpacing = 0.03;            // [kg, m]
 constexpr double kDominoLean = 0.2;                                    // of the first; beyond atan(1/6) it falls [rad]
-constexpr double kFloorThickness = 0.1;                                // [m]
+constexpr double kFloorThickness = 0.05;                               // [m]
 
 Isometry at(double x, double y, double z) {
   Isometry pose = Isometry::Identity();
@@ -65,7 +65,7 @@ class Solids {
   /// On a floor at z = 0, which reaches beyond them by as much as they are high, and a little.
   Model on_floor() const {
     const Vector3d middle = (low_ + high_) / 2;
-    const double beyond = 0.3 + high_.z();
+    const double beyond = 0.1 + high_.z();
     const CollisionShape floor{ShapeKind::box, {high_.x() - low_.x() + 2 * beyond, high_.y() - low_.y() + 2 * beyond, kFloorThickness}, ""};
     return with_world(builder_.build(), {{"floor", floor, pose_of(at(middle.x(), middle.y(), -kFloorThickness / 2))}});
   }
@@ -106,7 +106,7 @@ Model brick_wall(Index bricks) {
 Model box_pile(Index boxes) {
   Solids solids(fmt::format("pile:{}", boxes), "box");
   Random random(1);
-  const auto side = std::max<Index>(1, static_cast<Index>(std::floor(std::cbrt(0.5 * static_cast<double>(boxes)))));  // boxes a row of a layer
+  const auto side = std::max<Index>(1, static_cast<Index>(std::lround(std::cbrt(0.5 * static_cast<double>(boxes)))));  // boxes a row of a layer
   for (Index i = 0; i < boxes; ++i) {
     const auto place = [&](Index k) { return kPileSpacing * (static_cast<double>(k) - 0.5 * static_cast<double>(side - 1)); };
     Isometry pose = at(place(i % side), place(i / side % side), kPileSpacing * (static_cast<double>(i / (side * side)) + 0.5));
