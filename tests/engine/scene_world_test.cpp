@@ -221,6 +221,26 @@ TEST_CASE("a block falls on a table of a URDF that moves nothing, and tells whom
   CHECK(contact.pairs.size() == 2);
 }
 
+TEST_CASE("the crate of table.yaml comes to lie on the table, and is stopped by the post") {
+  const auto ends_at = [](Scene scene) {
+    Simulation simulation(scene);
+    REQUIRE(simulation.run(std::lround(scene.duration / scene.options.step)).ok());
+    CHECK(simulation.energy().kinetic < 1e-6);
+    return link_pose(Kinematics(simulation), place_of(simulation.model(), "crate")).shift;
+  };
+  const double post = -0.8 + 0.1 + 0.4;  // middle of a crate that touches it
+  Scene scene = load_scene(model_file("scenes/table.yaml"));
+  const std::array<double, 3> stopped = ends_at(scene);
+  CHECK(stopped[2] == Approx(1 + 0.4).margin(1e-5));
+  CHECK(stopped[1] > post - 1e-5);
+  std::vector<std::string> notes;
+  const double stiffness = scene.effects.contact->stiffness, friction = scene.effects.contact->friction;
+  scene.effects.contact = pair_contact_of(scene.model, notes, {{"crate", "world/post"}});
+  scene.effects.contact->stiffness = stiffness;
+  scene.effects.contact->friction = friction;
+  CHECK(ends_at(scene)[1] < post - 0.01);
+}
+
 TEST_CASE("models that all stand still are refused, alone and together") {
   const Things things;
   CHECK_THROWS_WITH(things.scene("model: table.urdf\n"), Contains("nothing moves") && Contains("base: floating"));
