@@ -28,7 +28,8 @@ TouchingSteps group_of(std::size_t places) {
 }
 
 std::size_t places_of(const Simulation& simulation) {
-  return static_cast<std::size_t>(std::ranges::count_if(simulation.contact_points(), [](const ContactPoint& point) { return !point.other_link.empty(); }));
+  const auto of_shapes = [](const ContactPoint& point) { return !point.other_link.empty(); };
+  return static_cast<std::size_t>(std::ranges::count_if(simulation.contact_points(), of_shapes));
 }
 
 }  // namespace

@@ -493,7 +493,8 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
                       {"writes", sweep.writes}});
   }
   if (costs.contact) {
-    Json& contact = result["contact"] = {{"pairs", costs.contact->pairs}, {"places_near", costs.contact->near}, {"find_us", 1e6 * costs.contact->find}};
+    Json& contact = result["contact"];
+    contact = {{"pairs", costs.contact->pairs}, {"places_near", costs.contact->near}, {"find_us", 1e6 * costs.contact->find}};
     Json& steps = contact["steps"] = Json::array();
     for (const TouchingSteps& group : costs.contact->steps) {
       steps.push_back({{"least_places", group.least}, {"most_places", group.most}, {"steps", group.count}, {"us_per_step", 1e6 * group.seconds}});

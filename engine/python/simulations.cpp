@@ -78,8 +78,10 @@ struct Contact {
 std::vector<Contact> contacts(PySimulation& self) {
   std::vector<Contact> found;
   const Names& names = self.look().model().names;
-  for (const ContactPoint& point : self.ask([](Simulation& simulation) { return simulation.contact_points(); }))
-    found.push_back({names.body[static_cast<std::size_t>(point.slot)], point.other == 0 ? point.other_link : names.body[static_cast<std::size_t>(point.other)], point});
+  for (const ContactPoint& point : self.ask([](Simulation& simulation) { return simulation.contact_points(); })) {
+    const std::string& other = point.other == 0 ? point.other_link : names.body[static_cast<std::size_t>(point.other)];
+    found.push_back({names.body[static_cast<std::size_t>(point.slot)], other, point});
+  }
   return found;
 }
 

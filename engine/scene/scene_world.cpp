@@ -45,7 +45,8 @@ CollisionShape sphere_of(const SceneValue& at) {
 
 CollisionShape round_of(const SceneValue& at, const std::string& type) {
   at.entries_of(kRound);
-  const double radius = required(at, type, "radius", "radius: in m").positive(), length = required(at, type, "length", "length: in m, along z").positive();
+  const double radius = required(at, type, "radius", "radius: in m").positive();
+  const double length = required(at, type, "length", "length: in m, along z").positive();
   return {type == "capsule" ? ShapeKind::capsule : ShapeKind::cylinder, {radius, length}, ""};
 }
 
@@ -56,7 +57,8 @@ CollisionShape mesh_of(const SceneValue& at, const std::string& folder) {
   const std::string path = std::filesystem::absolute(std::filesystem::path(folder) / file.text("a mesh file"), ignored).lexically_normal().string();
   CollisionShape shape{ShapeKind::mesh, {1, 1, 1}, path};
   if (!std::filesystem::is_regular_file(path, ignored)) {
-    file.fail(fmt::format("{}: there is no file {}", file.path(), quoted(path)), "a mesh, STL, OBJ or Collada, found relative to the scene", "check the path");
+    file.fail(fmt::format("{}: there is no file {}", file.path(), quoted(path)), "a mesh, STL, OBJ or Collada, found relative to the scene",
+              "check the path");
   }
   if (const auto scale = at.find("scale")) {
     shape.size = scale->vector(kScale);

@@ -83,14 +83,16 @@ Model brick_wall(Index bricks);
 /// The cubes of a stack above each other in layers, 0.18 m apart, each turned at random: they drop and come to lie in a heap.
 Model box_pile(Index boxes);
 
-/// A house of `storeys` storeys of cards of 0.1 x 0.06 x 0.002 m and 5 g, which lean at 0.35 rad; n (3 n + 1) / 2 cards. From a friction of 0.4 on it stands.
+/// A house of `storeys` storeys of cards of 0.1 x 0.06 x 0.002 m and 5 g, which lean at 0.35 rad; n (3 n + 1) / 2 cards. With a friction of 0.6 it
+/// stands.
 Model card_house(Index storeys);
 
 /// `count` dominoes along x, 0.01 x 0.03 x 0.06 m and 20 g, 0.03 m apart. The first leans beyond where it stands, and fells the others.
 Model domino_row(Index count);
 
 /// "chain:100", "paper-chain:100", "ball-chain:100", "tree:1023", "random:50", "humanoids:3", "ring:10", "fourbars:3", "ladder:5",
-/// "roller-chain:100", "net:4x6", "boxes:10", "wall:20", "pile:20", "cards:3", "dominoes:10". Throws InputError for anything else. Nets take memory and time that grow with the square of their rows and more:
+/// "roller-chain:100", "net:4x6", "boxes:10", "wall:20", "pile:20", "cards:3", "dominoes:10". Throws InputError for
+/// anything else. Nets take memory and time that grow with the square of their rows and more:
 /// several hundred rows take long.
 Model generate(const std::string& name);
 

@@ -58,7 +58,8 @@ class Things : public Folder {
   }
   /// A block or ball let go at a height, for a while: how high its middle is then.
   double height_of(const std::string& model, double height, const std::string& world, int steps = 1500) const {
-    const Scene read = scene(fmt::format("model: {}.urdf\nbase: floating\ninitial: {{base: {{position: [0, 0, {}]}}}}\nworld:\n{}{}", model, height, world, kEffects));
+    const Scene read = scene(fmt::format("model: {}.urdf\nbase: floating\ninitial: {{base: {{position: [0, 0, {}]}}}}\nworld:\n{}{}", model, height,
+                                         world, kEffects));
     CHECK(read.model.warnings.size() == (world.find("mesh") == world.npos ? 0u : 1u));  // of a mesh that stands as its hull
     Simulation simulation(read);
     REQUIRE(simulation.run(steps).ok());
@@ -68,19 +69,20 @@ class Things : public Folder {
 
 TEST_CASE("bodies come to rest on shapes of the world of every type, where they say they are") {
   const Things things;
-  constexpr double kHalf = 0.05, kSunk = 1e-6;
+  const Approx kRests = Approx(0.3 + 0.05).margin(1e-6);  // half of what falls above the top, less what it sinks
   // a face, a round top, a cylinder's flat end, a capsule's round end, a hull's face: each with its top at z = 0.3
-  CHECK(things.height_of("block", 0.5, "  - {type: box, size: [1, 1, 0.2], position: [0, 0, 0.2]}\n") == Approx(0.3 + kHalf).margin(kSunk));
-  CHECK(things.height_of("ball", 0.5, "  - {type: sphere, radius: 0.1, position: [0, 0, 0.2]}\n") == Approx(0.3 + kHalf).margin(kSunk));
-  CHECK(things.height_of("block", 0.5, "  - {type: cylinder, radius: 0.3, length: 0.2, position: [0, 0, 0.2]}\n") == Approx(0.3 + kHalf).margin(kSunk));
-  CHECK(things.height_of("ball", 0.5, "  - {type: capsule, radius: 0.1, length: 0.2, position: [0, 0, 0.1]}\n") == Approx(0.3 + kHalf).margin(kSunk));
-  CHECK(things.height_of("block", 0.5, "  - {type: mesh, file: wedge.obj, scale: [0.5, 0.5, 0.2], position: [0, 0, 0.3]}\n") == Approx(0.3 + kHalf).margin(kSunk));
+  CHECK(things.height_of("block", 0.5, "  - {type: box, size: [1, 1, 0.2], position: [0, 0, 0.2]}\n") == kRests);
+  CHECK(things.height_of("ball", 0.5, "  - {type: sphere, radius: 0.1, position: [0, 0, 0.2]}\n") == kRests);
+  CHECK(things.height_of("block", 0.5, "  - {type: cylinder, radius: 0.3, length: 0.2, position: [0, 0, 0.2]}\n") == kRests);
+  CHECK(things.height_of("ball", 0.5, "  - {type: capsule, radius: 0.1, length: 0.2, position: [0, 0, 0.1]}\n") == kRests);
+  CHECK(things.height_of("block", 0.5, "  - {type: mesh, file: wedge.obj, scale: [0.5, 0.5, 0.2], position: [0, 0, 0.3]}\n") == kRests);
   // turned: a box that stands on end, by roll, pitch and yaw and by a quaternion
-  CHECK(things.height_of("block", 0.5, "  - {type: box, size: [0.6, 1, 1], rotation: [0, 1.5707963267948966, 0]}\n") == Approx(0.3 + kHalf).margin(kSunk));
+  CHECK(things.height_of("block", 0.5, "  - {type: box, size: [0.6, 1, 1], rotation: [0, 1.5707963267948966, 0]}\n") == kRests);
   CHECK(things.height_of("block", 0.5, "  - {type: box, size: [0.6, 1, 1], quaternion: [0, 0.7071067811865476, 0, 0.7071067811865476]}\n") ==
-        Approx(0.3 + kHalf).margin(kSunk));
+        kRests);
   // beside it there is nothing
-  CHECK(things.height_of("block", 0.5, "  - {type: box, size: [1, 1, 0.2], position: [0.7, 0, 0.2]}\n", 300) == Approx(0.5 - 0.5 * 9.81 * 0.3 * 0.3).margin(1e-3));
+  CHECK(things.height_of("block", 0.5, "  - {type: box, size: [1, 1, 0.2], position: [0.7, 0, 0.2]}\n", 300) ==
+        Approx(0.5 - 0.5 * 9.81 * 0.3 * 0.3).margin(1e-3));
 }
 
 TEST_CASE("shapes of the world are links of it, with names of their own or their types'") {
