@@ -68,6 +68,7 @@ set(linden_public_headers
   models/build/generators.hpp
   models/build/isometry.hpp
   models/build/merged_models.hpp
+  models/build/world_shapes.hpp
   models/shapes/collision_pairs.hpp
   models/shapes/contacts_of.hpp
   models/shapes/pair_contact.hpp

@@ -59,6 +59,7 @@ struct ContactPoint {
   std::array<double, 3> normal{};    // of the ground there, or of what pushes, towards the body; unit length, world frame
   std::array<double, 3> force{};     // on the body, friction with it, mean over the step; world frame [N]
   Index other = 0;                   // body that pushes; 0: the ground, or what is fixed to the world
+  std::string link{}, other_link{};  // whose shapes touch, where two do; what stands in the world has a name too
 };
 
 class Simulation {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <tuple>
@@ -16,6 +17,7 @@
 #include "engine/files/report_files.hpp"
 #include "engine/mass_distribution.hpp"
 #include "engine/mobility.hpp"
+#include "engine/program/contact_cost.hpp"
 #include "engine/program/couplings_text.hpp"
 #include "engine/program/effect_cost.hpp"
 #include "engine/program/effects_text.hpp"
@@ -27,6 +29,7 @@
 #include "engine/version.hpp"
 #include "layout/state.hpp"
 #include "layout/workspace.hpp"
+#include "models/build/world_shapes.hpp"
 
 namespace linden {
 namespace {
@@ -128,10 +131,33 @@ struct MergedLink {
   std::string name;
 };
 
+/// Shapes that stand in the world, as they were added.
+std::vector<const BodyShape*> world_shapes(const Model& model) {
+  std::vector<const BodyShape*> shapes;
+  for (const BodyShape& shape : model.welded.shapes) {
+    if (stands_in_world(shape.link)) shapes.push_back(&shape);
+  }
+  return shapes;
+}
+
+/// "box 1 x 0.6 x 0.04 m", "sphere, radius 0.1 m", "mesh rock.stl"
+std::string size_text(const CollisionShape& shape) {
+  const std::array<double, 3>& size = shape.size;
+  switch (shape.kind) {
+    case ShapeKind::sphere: return fmt::format("sphere, radius {:g} m", size[0]);
+    case ShapeKind::box: return fmt::format("box {:g} x {:g} x {:g} m", size[0], size[1], size[2]);
+    case ShapeKind::cylinder: return fmt::format("cylinder, radius {:g} m, length {:g} m", size[0], size[1]);
+    case ShapeKind::capsule: return fmt::format("capsule, radius {:g} m, length {:g} m", size[0], size[1]);
+    case ShapeKind::mesh: break;
+  }
+  return fmt::format("mesh {}", printable(shape.mesh));
+}
+
 /// Links that have no body of their own, by slot and name.
 std::vector<MergedLink> merged_links(const Model& model) {
   std::vector<MergedLink> merged;
   for (const auto& [name, place] : model.names.link) {
+    if (place.slot == 0 && stands_in_world(name)) continue;
     if (place.slot == 0 || model.names.body[static_cast<std::size_t>(place.slot)] != name) merged.push_back({place.slot, name});
   }
   std::ranges::sort(merged, [](const MergedLink& a, const MergedLink& b) { return std::tie(a.slot, a.name) < std::tie(b.slot, b.name); });
@@ -155,6 +181,7 @@ struct Costs {
   std::vector<Sweep> sweeps;
   std::vector<double> of_sweeps;    // [ns per body]
   std::vector<EffectCost> effects;  // of a scene
+  std::optional<ContactCost> contact;  // of one that has it
 };
 
 /// Where the scene begins, or in the zero configuration.
@@ -169,6 +196,7 @@ Costs measure(const InspectArguments& arguments, const Model& model) {
   const InitialState start = arguments.scene ? arguments.scene->initial : InitialState();
   costs.of_sweeps = sweep_costs(model, arguments.options, plan, start, costs.sweeps);
   if (arguments.scene) costs.effects = effect_costs(*arguments.scene);
+  if (arguments.effects().contact) costs.contact = contact_cost(*arguments.scene);
   return costs;
 }
 
@@ -182,10 +210,12 @@ class Printer {
     effects();
     table();
     conventions();
+    world();
     merged();
     mimics();
     couplings();
     sweeps();
+    contact();
     warnings();
   }
 
@@ -283,6 +313,17 @@ class Printer {
     say("  Axes above: x y z in the frame of the link that the parent is called after. A tied joint follows another, as listed below.\n");
   }
 
+  void world() const {
+    const std::vector<const BodyShape*> shapes = world_shapes(model_);
+    if (shapes.empty()) return;
+    say("\nshapes that stand in the world\n");
+    for (const BodyShape* shape : std::span(shapes).first(shown(shapes.size()))) {
+      const std::array<double, 3>& at = shape->pose.shift;
+      say("  {}: {}, at {:g} {:g} {:g}\n", printable(shape->link), size_text(shape->shape), at[0], at[1], at[2]);
+    }
+    left_out(shapes.size());
+  }
+
   void merged() const {
     const std::vector<MergedLink> links = merged_links(model_);
     if (links.empty()) return;
@@ -340,6 +381,24 @@ class Printer {
     say("  start: where no step before is known; evaluation: of the first guess and after every correction; factor: where\n"
         "  that of an earlier step does not serve, and again where a correction gains little; arrival: at new positions, also\n"
         "  where a motion starts; ns/body: of each sweep alone on this machine, over the whole tree\n");
+  }
+
+  void contact() const {
+    if (!costs_.contact) return;
+    const ContactCost& cost = *costs_.contact;
+    std::int64_t steps = 0;
+    for (const TouchingSteps& group : cost.steps) steps += group.count;
+    say("\ncontact, beside these sweeps, over {} from where the scene begins\n", counted(steps, "step"));
+    say("  find   first: which of {} of shapes are near, and where they meet; {:.1f} us for {} at last\n",
+        counted(static_cast<std::int64_t>(cost.pairs), "pair"), 1e6 * cost.find, counted(static_cast<std::int64_t>(cost.near), "place"));
+    say("  rows   factor: three for each place, and what the tree feels of them\n"
+        "  solve  evaluation, correction: which of them press, stick or slide, all that touch each other together\n");
+    Table table({{"places that press", Align::left}, {"steps", Align::right}, {"us a step", Align::right}});
+    for (const TouchingSteps& group : cost.steps) {
+      table.add({group.least == group.most ? fmt::format("{}", group.least) : fmt::format("{} to {}", group.least, group.most),
+                 fmt::format("{}", group.count), fmt::format("{:.1f}", 1e6 * group.seconds)});
+    }
+    say_text(table.text("  "));
   }
 
   void warnings() const {
@@ -411,6 +470,10 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
   for (const Run& run : tree.runs) runs.push_back({{"begin", run.begin}, {"end", run.end}, {"kind", kind_name(run.kind)}});
   Json& merged = result["merged_links"] = Json::array();
   for (const MergedLink& link : merged_links(model)) merged.push_back({{"link", link.name}, {"slot", link.slot}});
+  Json& world = result["world"] = Json::array();
+  for (const BodyShape* shape : world_shapes(model)) {
+    world.push_back({{"link", shape->link}, {"shape", size_text(shape->shape)}, {"position", shape->pose.shift}, {"rotation", shape->pose.rotation}});
+  }
   Json& mimics = result["mimics"] = Json::array();
   for (const Mimic& mimic : model.mimics) {
     mimics.push_back({{"follower", name(model.names.joint, mimic.follower_slot)},
@@ -428,6 +491,14 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
                       {"ns_per_body", costs.of_sweeps[k]},
                       {"reads", sweep.reads},
                       {"writes", sweep.writes}});
+  }
+  if (costs.contact) {
+    Json& contact = result["contact"];
+    contact = {{"pairs", costs.contact->pairs}, {"places_near", costs.contact->near}, {"find_us", 1e6 * costs.contact->find}};
+    Json& steps = contact["steps"] = Json::array();
+    for (const TouchingSteps& group : costs.contact->steps) {
+      steps.push_back({{"least_places", group.least}, {"most_places", group.most}, {"steps", group.count}, {"us_per_step", 1e6 * group.seconds}});
+    }
   }
   if (arguments.scene) {
     const Scene& scene = *arguments.scene;

@@ -33,7 +33,7 @@ namespace {
 
 constexpr const char* kSceneHelp =
     "SCENE.yaml, FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, "
-    "roller-chain:N, net:AxB";
+    "roller-chain:N, net:AxB; loose solids boxes:N, wall:N, pile:N, cards:N, dominoes:N";
 constexpr const char* kModelHelp =
     "FILE.urdf, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, roller-chain:N, net:AxB";
 

@@ -81,7 +81,7 @@ void read_motion_options(const OptionTexts& texts, MotionArguments& motion, Opti
 template <class Arguments, class Read>
 void read_over_scene(Arguments& arguments, Options& options, const Read& read) {
   read();
-  if (!is_scene(arguments.model)) return;
+  if (!is_scene(arguments.model) && !is_generated_scene(arguments.model)) return;
   if (arguments.base) {
     throw InputError(fmt::format("--base is for URDF files; {} says itself what floats: leave --base out", arguments.model));
   }
@@ -234,7 +234,7 @@ void read_view_command_options(const OptionTexts& texts, ViewCommandArguments& v
     throw InputError(fmt::format("{} is about recordings, and {} is none (.npz, .h5, .csv): leave it out",
                                  texts.recorded.empty() ? "--shown" : "--model", view.model));
   }
-  view.moves = !texts.duration.empty() || is_scene(view.model);
+  view.moves = !texts.duration.empty() || is_scene(view.model) || is_generated_scene(view.model);
   read_run_options(texts, view);
 }
 

@@ -12,6 +12,7 @@
 #include "engine/python/bindings.hpp"
 #include "engine/python/numbers.hpp"
 #include "engine/scene/load_model.hpp"
+#include "models/build/generators.hpp"
 #include "models/urdf/urdf.hpp"
 
 using namespace nanobind::literals;
@@ -102,6 +103,7 @@ void bind_models(nb::module_& m) {
         return std::make_shared<Model>(load_model(name, root, density));
       },
       "name"_a, "base"_a = nb::none(), "density"_a = nb::none());
+  m.def("needs_contact", &needs_contact, "name"_a);
   m.def(
       "parse_urdf",
       [](const std::string& text, const std::string& source, const std::string& base, std::optional<double> density) {

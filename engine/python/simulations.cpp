@@ -78,8 +78,10 @@ struct Contact {
 std::vector<Contact> contacts(PySimulation& self) {
   std::vector<Contact> found;
   const Names& names = self.look().model().names;
-  for (const ContactPoint& point : self.ask([](Simulation& simulation) { return simulation.contact_points(); }))
-    found.push_back({names.body[static_cast<std::size_t>(point.slot)], point.other == 0 ? "" : names.body[static_cast<std::size_t>(point.other)], point});
+  for (const ContactPoint& point : self.ask([](Simulation& simulation) { return simulation.contact_points(); })) {
+    const std::string& other = point.other == 0 ? point.other_link : names.body[static_cast<std::size_t>(point.other)];
+    found.push_back({names.body[static_cast<std::size_t>(point.slot)], other, point});
+  }
   return found;
 }
 
@@ -178,7 +180,7 @@ void bind_contact(nb::module_& m) {
   const auto three = [](const std::array<double, 3>& numbers) { return fixed_array(std::span<const double>(numbers)); };
   nb::class_<Contact>(m, "Contact", "Where the ground pushes a body, or another body does, in the step taken last; world frame.")
       .def_ro("body", &Contact::body, "That is pushed.")
-      .def_ro("other", &Contact::other, "Body that pushes; empty: the ground, or what is fixed to the world.")
+      .def_ro("other", &Contact::other, "Body that pushes, or the link that is fixed to the world, world/table; empty: the ground.")
       .def_prop_ro(
           "place", [three](const Contact& self) { return three(self.point.place); }, "Where they touch [3; m].")
       .def_prop_ro(

@@ -41,6 +41,11 @@ std::vector<ContactPoint> Simulation::contact_points() const {
       if (!on_b) point.normal[k] = -point.normal[k];
     }
     point.other = on_b ? touch.slot_a : touch.slot_b;
+    const PairContact& contact = *plan_->effects.contact;
+    const auto& [first, second] = contact.pairs[touch.pair];
+    const bool in_order = contact.shapes[first].slot == point.slot;
+    point.link = contact.shapes[in_order ? first : second].link;
+    point.other_link = contact.shapes[in_order ? second : first].link;
   }
   return points;
 }

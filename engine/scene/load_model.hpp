@@ -10,7 +10,8 @@
 
 namespace linden {
 
-/// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, roller-chain:N, net:AxB.
+/// A URDF file, or chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, ring:N, fourbars:N, ladder:N, roller-chain:N, net:AxB,
+/// boxes:N, wall:N, pile:N, cards:N, dominoes:N.
 /// `base` is for URDF files (fixed where it is not given); throws InputError where it is given for a generated model, for a scene, and for
 /// whatever cannot be read. `density` [kg/m^3]: for URDF files too, of links without inertia (models/urdf/urdf.hpp).
 Model load_model(const std::string& name, std::optional<Base> base, std::optional<double> density = std::nullopt);

@@ -15,6 +15,7 @@
 #include "engine/scene/scene_couplings.hpp"
 #include "engine/scene/scene_effects.hpp"
 #include "engine/scene/scene_start.hpp"
+#include "engine/scene/scene_world.hpp"
 #include "engine/scene/scene_yaml.hpp"
 #include "engine/start_check.hpp"
 #include "layout/smooth_curve.hpp"
@@ -30,13 +31,17 @@ using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
                                       "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
-                                      "inertia", "randomize", "couplings", "assemble"};
+                                      "inertia", "randomize", "couplings", "assemble", "world"};
 const std::vector<std::string> kModel{"model",    "base",       "name",     "parent", "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
 const std::vector<std::string> kInertia{"density"};
 const std::vector<std::string> kYesNo{"true", "false"};
 const std::vector<std::string> kStarts{"checked", "as given"};
+/// Of a model that needs contact.
+constexpr const char* kGeneratedScene = R"(duration: 5
+effects: {gravity: [0, 0, -9.81], contact: {stiffness: 1e8, friction: 0.6}}
+)";
 constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 
 /// A model of the list `models`.
@@ -56,6 +61,7 @@ class SceneReader {
   Scene read() {
     root_.entries_of(kScene, effect_keys(), "effects");
     read_model();
+    if (const auto world = root_.find("world")) scene_.model = read_world(*world, std::move(scene_.model), folder_);
     if (const auto couplings = root_.find("couplings")) {
       SceneCouplings coupled = read_couplings(*couplings, std::move(scene_.model));
       scene_.model = std::move(coupled.model);
@@ -88,6 +94,7 @@ class SceneReader {
       std::ranges::move(read.warnings, std::back_inserter(scene_.model.warnings));
       if (const auto ground = effects->find("ground")) warn_of_stiff_ground(*ground);
     }
+    warn_of_shapes_untouched();
     add_cable_ends();
     scene_.seed = read_seed(initial, given_).value_or(kDefaultSeed);
     if (const auto randomize = root_.find("randomize")) read_randomize(*randomize);
@@ -212,6 +219,14 @@ class SceneReader {
         at.place(), h, stiffness, stiff->mass, quoted(stiff->link), std::sqrt(stiff->mass / stiffness), stiff->mass / (h * h)));
   }
 
+  /// Shapes of the scene's world that nothing can touch.
+  void warn_of_shapes_untouched() {
+    const auto world = root_.find("world");
+    if (!world || scene_.effects.contact || world->list("shapes").empty()) return;
+    scene_.model.warnings.push_back(fmt::format("{}: nothing touches these shapes: bodies touch by the effect contact, which is not there (effects: "
+                                                "{{contact: {{}}}})", world->place()));
+  }
+
   void read_model() {
     if (model_) {
       for (const std::string_view key : {"model", "models", "base", "inertia"}) {
@@ -256,7 +271,8 @@ class SceneReader {
     return given_.density ? given_.density : density;
   }
 
-  Model load(const SceneValue& at, const std::optional<SceneValue>& base, const std::optional<SceneValue>& inertia) const {
+  Model load(const SceneValue& at, const std::optional<SceneValue>& base, const std::optional<SceneValue>& inertia,
+             Still still = Still::refused) const {
     const std::string& name = at.text(kAModel);
     const std::optional<Base> root =
         base ? std::optional(base->choice(kBases) == "floating" ? Base::floating : Base::fixed) : std::nullopt;
@@ -275,7 +291,7 @@ class SceneReader {
       at.fail(fmt::format("{}: there is no file {}", at.path(), quoted(file)), "a URDF file, found relative to the scene",
               "check the path; a generated model is written chain:3");
     }
-    return load_urdf(file, root.value_or(Base::fixed), Reading::lenient, density_of(inertia));
+    return load_urdf(file, root.value_or(Base::fixed), Reading::lenient, density_of(inertia), still);
   }
 
   void read_models(const SceneValue& at) {
@@ -288,7 +304,7 @@ class SceneReader {
       if (!model)
         item.fail(fmt::format("{} has no model", item.path()), "model: and a URDF file, or a generated one such as chain:3",
                   "add it");
-      PlacedModel placed{load(*model, item.find("base"), item.find("inertia")), ""};
+      PlacedModel placed{load(*model, item.find("base"), item.find("inertia"), Still::furniture), ""};
       entrants.push_back({item, std::move(placed), read_base(item)});
       const auto name = item.find("name");
       if (name) entrants.back().placed.name = name->text("a name");
@@ -302,6 +318,9 @@ class SceneReader {
       parts.push_back(std::move(entrant.placed));
     }
     scene_.model = at.located([&] { return merged(parts, std::filesystem::path(file_).stem().string()); });
+    if (scene_.model.tree.bodies() == 0) {
+      at.fail("nothing moves: all models are rigid bodies, fixed to the world", "one that moves", "write base: floating beside one of them");
+    }
     for (const Entrant& entrant : entrants) remember_bases(entrant, parts[static_cast<std::size_t>(&entrant - entrants.data())]);
   }
 
@@ -317,8 +336,12 @@ class SceneReader {
     return bytes;
   }
 
-  /// Several models need a name each: the one they are given, or their own.
+  /// Several models need a name each: the one they are given, or their own. Shapes of the world are called world/NAME.
   static void give_names(std::vector<Entrant>& entrants) {
+    for (const Entrant& entrant : entrants) {
+      const std::string& called = entrant.placed.name.empty() && entrants.size() > 1 ? entrant.placed.model.names.model : entrant.placed.name;
+      if (called == "world") entrant.at.fail("a model is called world", "another name: the world itself is called so", "write name: beside it");
+    }
     if (entrants.size() == 1) return;
     std::unordered_set<std::string> seen;
     for (Entrant& entrant : entrants) {
@@ -402,7 +425,13 @@ class SceneReader {
 
 bool is_scene(const std::string& file) { return file.ends_with(".yaml") || file.ends_with(".yml"); }
 
+bool is_generated_scene(const std::string& name) { return needs_contact(name); }
+
 Scene load_scene(const std::string& file, const SceneStart& given) {
+  if (is_generated_scene(file)) {
+    const SceneYaml yaml(kGeneratedScene, file);
+    return SceneReader(yaml, given, load_model(file, std::nullopt, given.density)).read();
+  }
   const FilesRead files;
   Scene scene = parse_scene(read_text(file, "a scene", SceneYaml::kMostBytes), file, given);
   scene.files = files.names();

@@ -12,6 +12,7 @@
 //   model | models   one of them. models: a list of {model, base, name, position, rotation or quaternion, velocity,
 //                    angular_velocity}; several are one system, links and joints of each called name/link and name/joint, where
 //                    the name is the model's own unless it is given
+//   world            shapes that stand in the world and that bodies touch (engine/scene/scene_world.hpp)
 //   inertia          {density: kg/m^3}, beside model or beside each of models: mass of links that have shapes and no <inertial>
 //   base             fixed (default) or floating, for a URDF file
 //   step, duration, solver, guess, tolerance, stop, max_iterations, max_splits, order   as engine/options.hpp; where no
@@ -52,7 +53,11 @@ struct SceneStart {
 /// Whether the name is that of a scene: it ends in .yaml or .yml.
 bool is_scene(const std::string& file);
 
-/// Reads a scene; what could be named and does nothing is in its model's warnings. `given` goes over what the scene says.
+/// Whether the name is a generated model that is nothing by itself (needs_contact): `linden run` and its like take it as load_scene does, with
+/// gravity and contact.
+bool is_generated_scene(const std::string& name);
+
+/// Reads a scene, or makes a generated one; what could be named and does nothing is in its model's warnings. `given` goes over what the scene says.
 Scene load_scene(const std::string& file, const SceneStart& given = {});
 
 /// The same from memory; `file` stands for the source, and the files that the scene names are found relative to it.

@@ -59,8 +59,8 @@ Isometry3d turned_by(const Matrix3d& rotation) {
 class Build {
  public:
   Build(const std::string& name, const std::string& source, const std::vector<LinkSpec>& links,
-        const std::vector<std::string>& warnings)
-      : source_(source.empty() ? name : source), links_(links), carrier_(links.size()) {
+        const std::vector<std::string>& warnings, bool may_stand_still)
+      : source_(source.empty() ? name : source), links_(links), may_stand_still_(may_stand_still), carrier_(links.size()) {
     model_.names.model = name;
     model_.source = source;
     model_.warnings = warnings;
@@ -73,7 +73,7 @@ class Build {
       check(links_[link], source_, model_.warnings);
       place(link);
     }
-    if (bodies_.empty()) fail("nothing moves: every joint is fixed; at least one moving joint is needed");
+    if (bodies_.empty() && !may_stand_still_) fail("nothing moves: every joint is fixed; at least one moving joint is needed");
     check_bodies();
     sort_bodies();
     lay_out();
@@ -484,6 +484,7 @@ class Build {
 
   std::string source_;
   const std::vector<LinkSpec>& links_;
+  bool may_stand_still_;
   std::unordered_map<std::string, std::size_t> link_at_, joint_at_;
   std::vector<std::size_t> order_;
   std::vector<Carrier> carrier_;
@@ -534,8 +535,13 @@ TreeBuilder& TreeBuilder::visual_fault(std::string message) {
   return *this;
 }
 
+TreeBuilder& TreeBuilder::may_stand_still() {
+  may_stand_still_ = true;
+  return *this;
+}
+
 Model TreeBuilder::build() const {
-  Model model = Build(name_, source_, links_, warnings_).run();
+  Model model = Build(name_, source_, links_, warnings_, may_stand_still_).run();
   model.notes = notes_;
   model.visual_faults.insert(model.visual_faults.begin(), visual_faults_.begin(), visual_faults_.end());
   return model;

@@ -78,6 +78,8 @@ class TreeBuilder {
   TreeBuilder& warn(std::string message);
   TreeBuilder& note(std::string message);
   TreeBuilder& visual_fault(std::string message);
+  /// All joints may be fixed: a model without bodies, which is for merging with others (models/build/merged_models.hpp).
+  TreeBuilder& may_stand_still();
 
   /// Throws InputError: unknown parent, a loop, names used twice, an inertia that no body has, a shape of negative size, a
   /// coordinate that moves no mass or none that others do not move in the same way, a mimic of a joint that does not exist or is no
@@ -89,6 +91,7 @@ class TreeBuilder {
   std::string source_;
   std::vector<LinkSpec> links_;
   std::vector<std::string> warnings_, notes_, visual_faults_;
+  bool may_stand_still_ = false;
 };
 
 }  // namespace linden

@@ -217,7 +217,10 @@ struct GeneratedKind {
   Model (*make)(Index);
   Index least = 1;
   double bodies = 1, rows = 0;  // of each that the number counts; its rows are solved together
+  bool loose = false;           // solids that touch: those of contacts, of all of them together
 };
+constexpr double kRowsOfSolid = 12;  // four places where it is touched
+constexpr std::string_view kCards = "cards";
 constexpr GeneratedKind kGeneratedKinds[] = {
     {"chain", chain},
     {"ball-chain", ball_chain},
@@ -229,6 +232,11 @@ constexpr GeneratedKind kGeneratedKinds[] = {
     {"fourbars", four_bars, 1, 3, 5},
     {"ladder", ladder, 1, 3, 5},
     {"roller-chain", roller_chain, 1, 3, 6},
+    {"boxes", box_stack, 1, 1, kRowsOfSolid, true},
+    {"wall", brick_wall, 1, 1, kRowsOfSolid, true},
+    {"pile", box_pile, 1, 1, kRowsOfSolid, true},
+    {"dominoes", domino_row, 1, 1, kRowsOfSolid, true},
+    {kCards, card_house, 1, 1, kRowsOfSolid, true},
 };
 constexpr std::string_view kNet = "net";
 
@@ -282,7 +290,7 @@ Model generate(const std::string& name) {
   }
   if (kind) return kind->make(count);
   throw InputError(fmt::format("model {}: {} cannot be generated; expected chain, ball-chain, paper-chain, tree, random, humanoids, ring, "
-                               "fourbars, ladder, roller-chain or net; choose one, or give a URDF file",
+                               "fourbars, ladder, roller-chain, net, boxes, wall, pile, cards or dominoes; choose one, or give a URDF file",
                                quoted(name), quoted(parts.kind)));
 }
 
@@ -298,8 +306,15 @@ GeneratedSize generated_size(const std::string& name) {
     return {2 * knots, 3 * knots, 3 * knots};
   }
   const GeneratedKind* kind = parts.known();
-  const double count = number(parts.size);
-  return kind ? GeneratedSize{kind->bodies * count, kind->rows * count, kind->rows} : GeneratedSize{};
+  double count = number(parts.size);
+  if (parts.kind == kCards) count *= (3 * count + 1) / 2;
+  if (!kind) return {};
+  return {kind->bodies * count, kind->rows * count, kind->rows * (kind->loose ? count : 1)};
+}
+
+bool needs_contact(const std::string& name) {
+  const GeneratedKind* kind = is_generated(name) ? generated_parts(name).known() : nullptr;
+  return kind && kind->loose;
 }
 
 }  // namespace linden

@@ -70,8 +70,29 @@ Model roller_chain(Index links);
 /// coupling each. 2 ropes knots - knots bodies, 3 (ropes - 1) knots rows. From two ropes on.
 Model rope_net(Index ropes, Index knots);
 
+// Loose solids, each on a free joint, on a floor that stands in the world ("world/floor", its top at z = 0). What touches does so without a gap at
+// zero. They fall through each other where there is no contact: see needs_contact.
+
+/// A stack of `boxes` cubes of 0.1 m and 1 kg, each on the one before.
+Model box_stack(Index boxes);
+
+/// A wall of `bricks` along x, 0.2 x 0.1 x 0.1 m and 2 kg, courses shifted by half a brick against the one below, with halves at the ends of every
+/// other; about as high as long.
+Model brick_wall(Index bricks);
+
+/// The cubes of a stack above each other in layers, 0.18 m apart, each turned at random: they drop and come to lie in a heap.
+Model box_pile(Index boxes);
+
+/// A house of `storeys` storeys of cards of 0.1 x 0.06 x 0.002 m and 5 g, which lean at 0.35 rad; n (3 n + 1) / 2 cards. With a friction of 0.6 it
+/// stands.
+Model card_house(Index storeys);
+
+/// `count` dominoes along x, 0.01 x 0.03 x 0.06 m and 20 g, 0.03 m apart. The first leans beyond where it stands, and fells the others.
+Model domino_row(Index count);
+
 /// "chain:100", "paper-chain:100", "ball-chain:100", "tree:1023", "random:50", "humanoids:3", "ring:10", "fourbars:3", "ladder:5",
-/// "roller-chain:100", "net:4x6". Throws InputError for anything else. Nets take memory and time that grow with the square of their rows and more:
+/// "roller-chain:100", "net:4x6", "boxes:10", "wall:20", "pile:20", "cards:3", "dominoes:10". Throws InputError for
+/// anything else. Nets take memory and time that grow with the square of their rows and more:
 /// several hundred rows take long.
 Model generate(const std::string& name);
 
@@ -81,6 +102,9 @@ struct GeneratedSize {
   double rows = 0, together = 0;  // of couplings; of those that are solved together (engine/sweeps/coupling_paths.hpp)
 };
 GeneratedSize generated_size(const std::string& name);
+
+/// Whether the model of this name is loose solids, which are nothing without contact: `linden run boxes:10` has it then.
+bool needs_contact(const std::string& name);
 
 /// Whether `name` has the form of a generated model, as against a file.
 bool is_generated(const std::string& name);

@@ -7,6 +7,7 @@
 
 #include "layout/effects.hpp"
 #include "layout/support/input_error.hpp"
+#include "models/build/world_shapes.hpp"
 
 namespace linden {
 
@@ -49,8 +50,11 @@ CollisionPairs::CollisionPairs(const Model& model, const LinkPairs& disabled) {
 
 bool CollisionPairs::may_touch(Index slot_a, const std::string& link_a, Index slot_b, const std::string& link_b) const {
   if (slot_a == slot_b) return false;
-  if (parent_[static_cast<std::size_t>(slot_a)] == slot_b || parent_[static_cast<std::size_t>(slot_b)] == slot_a) return false;
-  if (tied_.contains({std::min(slot_a, slot_b), std::max(slot_a, slot_b)})) return false;
+  const bool apart = (slot_a == 0 && stands_in_world(link_a)) || (slot_b == 0 && stands_in_world(link_b));
+  if (!apart) {
+    if (parent_[static_cast<std::size_t>(slot_a)] == slot_b || parent_[static_cast<std::size_t>(slot_b)] == slot_a) return false;
+    if (tied_.contains({std::min(slot_a, slot_b), std::max(slot_a, slot_b)})) return false;
+  }
   return disabled_.empty() || !disabled_.contains({std::min(link_a, link_b), std::max(link_a, link_b)});
 }
 

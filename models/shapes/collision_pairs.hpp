@@ -3,7 +3,7 @@
 //
 //   - links of one body
 //   - neighbours in the tree: the bodies on both sides of a joint, of any kind but a free one, which overlap where it sits; so what is fixed to the
-//     world and a body that hangs on the world
+//     world and a body that hangs on the world; but shapes that stand there of themselves (models/build/world_shapes.hpp) have no neighbours
 //   - bodies that a coupling ties; gears tie coordinates, cables, rods and springs run between bodies, so these do not
 //     count
 //   - links that a caller names, as SRDF files do

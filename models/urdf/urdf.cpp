@@ -197,12 +197,12 @@ Model built(const TreeBuilder& builder, const std::string& suspect) {
 
 }  // namespace
 
-Model load_urdf(const std::string& file, Base base, Reading reading, std::optional<double> density) {
-  return parse_urdf(read_text(file, "a URDF file"), file, base, reading, density);
+Model load_urdf(const std::string& file, Base base, Reading reading, std::optional<double> density, Still still) {
+  return parse_urdf(read_text(file, "a URDF file"), file, base, reading, density, still);
 }
 
 Model parse_urdf(const std::string& xml, const std::string& source_name, Base base, Reading reading,
-                 std::optional<double> density) {
+                 std::optional<double> density, Still still) {
   std::optional<ShapeMass> mass;
   if (density) mass.emplace(*density, source_name);
   CheckedUrdf checked = check_urdf(xml, source_name, density.has_value());
@@ -228,11 +228,12 @@ Model parse_urdf(const std::string& xml, const std::string& source_name, Base ba
     moves = moves || joint->type != urdf::Joint::FIXED;
     add(spec_of(*joint, *link), *link);
   }
-  if (!moves) {
+  if (!moves && still == Still::refused) {
     throw InputError(fmt::format("{}: nothing moves: the robot is one rigid body, fixed to the world; expected a joint that moves; let its "
-                                 "base float by --base floating",
+                                 "base float by --base floating, in a scene by base: floating",
                                  source_name));
   }
+  if (still == Still::furniture) builder.may_stand_still();
   if (mass) {
     for (const std::string& trouble : mass->troubles()) builder.warn(trouble);
     builder.note(mass->note());

@@ -36,16 +36,20 @@ namespace linden {
 
 enum class Base : std::uint8_t { fixed, floating };
 
+/// Whether a robot of which nothing moves is refused. Furniture: a model without bodies, for merging with others
+/// (models/build/merged_models.hpp).
+enum class Still : std::uint8_t { refused, furniture };
+
 /// What becomes of warnings: strict reading refuses a file that gives any.
 enum class Reading : std::uint8_t { lenient, strict };
 
 /// Reads a URDF file. Throws InputError: `file:line: what was found; what was expected; what to do`.
 /// `density` [kg/m^3]: of links that have shapes and no <inertial>, which get mass and inertia by it; what became of them is in Model::notes.
 Model load_urdf(const std::string& file, Base base = Base::fixed, Reading reading = Reading::lenient,
-                std::optional<double> density = std::nullopt);
+                std::optional<double> density = std::nullopt, Still still = Still::refused);
 
 /// The same from memory; `source_name` stands for the file in messages. Threads may call both at once.
 Model parse_urdf(const std::string& xml, const std::string& source_name, Base base = Base::fixed,
-                 Reading reading = Reading::lenient, std::optional<double> density = std::nullopt);
+                 Reading reading = Reading::lenient, std::optional<double> density = std::nullopt, Still still = Still::refused);
 
 }  // namespace linden

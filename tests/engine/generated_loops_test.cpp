@@ -147,7 +147,7 @@ TEST_CASE("loops of a size that there is not are refused by name") {
     CHECK_THROWS_WITH(generate(std::string("net:") + size), Contains("\" is no size of a net; expected ropes x knots of each") && Contains("net:4x6"));
   }
   CHECK_THROWS_WITH(generate("rings:4"),
-                    Contains("expected chain, ball-chain, paper-chain, tree, random, humanoids, ring, fourbars, ladder, roller-chain or net"));
+                    Contains("expected chain, ball-chain, paper-chain, tree, random, humanoids, ring, fourbars, ladder, roller-chain, net, boxes, wall, pile, cards or dominoes"));
 }
 
 TEST_CASE("what loops take of memory grows with the square of the rows that are solved together") {

@@ -122,6 +122,32 @@ def test_the_ground_carries_what_rests_on_it() -> None:
     assert sim.observe(["contact:ball"]) == pytest.approx([1, 2 * 9.81], abs=1e-5)
 
 
+def test_shapes_of_the_world_carry_what_lies_on_them_and_are_named() -> None:
+    sim = linden.Simulation(
+        linden.parse_urdf(BALL, "floating"),
+        step=1e-3,
+        initial={"base": {"position": [0, 0, 0.85]}},
+        world=[{"type": "box", "name": "table", "size": [1, 1, 0.1], "position": [0, 0, 0.7]}],
+        effects={"gravity": list(GRAVITY), "contact": {"stiffness": 1e8}},
+    )
+    sim.keep_forces()
+    sim.run(1000)
+    (contact,) = sim.contacts
+    assert contact.other == "world/table"
+    assert sim.pose("ball").position[2] == pytest.approx(0.85, abs=1e-6)
+    with pytest.raises(linden.InputError, match="world\\[0\\] has no type"):
+        linden.scene("chain:2", world=[{"radius": 1}])
+
+
+def test_generated_solids_have_contact_unless_effects_are_given() -> None:
+    sim = linden.Simulation("boxes:2", step=1e-3)
+    sim.run(100)
+    assert sim.pose("box2").position[2] == pytest.approx(0.15, abs=1e-6)
+    bare = linden.Simulation("boxes:2", step=1e-3, effects={"gravity": list(GRAVITY)})
+    bare.run(100)
+    assert bare.pose("box2").position[2] < 0.11
+
+
 def test_four_corners_share_a_weight() -> None:
     sim = resting(BLOCK, 0.1)
     assert len(sim.contacts) == 4

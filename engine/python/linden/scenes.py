@@ -38,6 +38,8 @@ class Settings(TypedDict, total=False):
     """"checked", or "as given": begins outside limits or in the ground all the same."""
     effects: dict[str, Any]
     """{"gravity": [0, 0, -9.81], "servo": {"stiffness": 200}, "ground": {...}, ...}. What is not named is not there, gravity included."""
+    world: list[dict[str, Any]]
+    """Shapes that stand in the world: [{"type": "box", "name": "table", "size": [1, 1, 0.1], "position": [0, 0, 0.7]}, ...]."""
     randomize: dict[str, Any]
     """{"masses": 0.2, "friction": [0.4, 1.0], ...}: what is drawn for each instance."""
 
@@ -51,7 +53,7 @@ def _tell(texts: list[str], stacklevel: int) -> None:
 
 def load(name: str | os.PathLike[str], base: str | None = None, density: float | None = None) -> Model:
     """A URDF file, or a generated model: chain:N, ball-chain:N, paper-chain:N, tree:N, random:N, humanoids:N, and with loops ring:N,
-    fourbars:N, ladder:N, roller-chain:N, net:AxB.
+    fourbars:N, ladder:N, roller-chain:N, net:AxB, and loose solids boxes:N, wall:N, pile:N, cards:N, dominoes:N.
 
     base: "fixed" (where it is not given) or "floating", for URDF files. density: of links that have shapes and no inertia [kg/m^3].
     Raises InputError with file and line. What was read with a grain of salt is told as an InputWarning, and is in model.warnings.
@@ -80,7 +82,8 @@ def load_scene(
 
 
 def scene(model: Model | str | os.PathLike[str] | None = None, **settings: Unpack[Settings]) -> Scene:
-    """A scene of a model and of settings, with the keys of a scene's file; gravity is 0 0 -9.81 m/s^2 where no `effects` are given.
+    """A scene of a model and of settings, with the keys of a scene's file; gravity is 0 0 -9.81 m/s^2 where no `effects` are given, and the
+    loose solids that are generated have contact.
 
     Without a model the settings name it, as a file would: scene(model=None, models=[...]) for several. Files are found relative to the
     current folder. Raises InputError that names the key.
@@ -108,7 +111,10 @@ def made_scene(source: Model | Scene | str | os.PathLike[str] | None, settings: 
         raise TypeError(f"model: {kind} is given; expected a Model, a Scene, or the name of a file or of a generated model")
     known = len(source.warnings) if source is not None else 0
     values = dict(settings)
-    values.setdefault("effects", {"gravity": [0, 0, -9.81]})
+    effects: dict[str, Any] = {"gravity": [0, 0, -9.81]}
+    if source is not None and _core.needs_contact(source.name):
+        effects["contact"] = {"stiffness": 1e8, "friction": 0.6}  # as linden run has it
+    values.setdefault("effects", effects)
     made = _core.scene_of(source, values)
     _tell(made.model.warnings[known:], stacklevel + 1)
     return made
