@@ -46,7 +46,7 @@ class EffectSweeps {
         body_laws_(laws_of<BodyLaws<S>>(plan.setup(model.tree))) {
     sum_.allocate(tree_.shape);  // factors of blocks add joints and bodies whichever there are
     for (Field<S>* field : {&excess_, &excess_before_, &reading_, &bend_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
-    if (plan.pairs) between_.allocate(tree_.shape.velocities);
+    if (plan.pairs) between_.allocate(tree_.shape.velocities, as<S>(0.0));
     if (plan.rotor.rows() > 0) {
       rotors_.allocate(plan.rotor.rows());
       for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));

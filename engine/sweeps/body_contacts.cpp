@@ -11,14 +11,11 @@
 namespace linden {
 namespace {
 
-/// Of their size by which shapes may be apart to be looked at, whatever they do.
-constexpr double kNearBy = 0.02;
-
 /// Contacts that are remembered, for each shape; no shape is touched at more places at once.
 constexpr std::size_t kMostOfShape = 32;
 
-/// Numbers of one: its pair, from 1; both halves of its feature; the force on b in the world's frame, and along the normal [N].
-constexpr std::size_t kNumbers = 7, kForce = 3, kLoad = 6;
+/// Numbers of one.
+constexpr std::size_t kNumbers = kNumbersOfTouch, kForce = 3, kLoad = 6;
 
 Vec3<double> vector(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
@@ -86,7 +83,7 @@ bool BodyContacts::find(const Field<double, 12>& pose) {
   bool changed = false;
   for (std::size_t pair = 0; pair < contact_.pairs.size(); ++pair) {
     const auto& [a, b] = contact_.pairs[pair];
-    const double margin = kNearBy * std::min(reach_[a], reach_[b]) + 2 * (moved[a] + moved[b]);
+    const double margin = gap_looked_at(reach_[a], reach_[b], moved[a], moved[b]);
     const Vec3<double> apart = vector(poses_[b].shift.data()) - vector(poses_[a].shift.data());
     const double reach = reach_[a] + reach_[b] + margin;
     if (dot(apart, apart) > reach * reach) continue;

@@ -14,6 +14,7 @@
 // stores is what it bore in the last step, and that much more.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -21,6 +22,7 @@
 
 #include "engine/effects/step_impulses.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
+#include "kernels/values/scalar.hpp"
 #include "layout/effects/contact.hpp"
 #include "layout/field.hpp"
 #include "layout/pose.hpp"
@@ -29,6 +31,20 @@ namespace linden {
 
 /// Speed at which depth that the motion did not make may come to push [m/s].
 inline constexpr double kRecoverySpeed = 1e-2;
+
+/// Of their size by which shapes may be apart to be looked at, whatever they do.
+inline constexpr double kNearBy = 0.02;
+/// Up to which gap two shapes that reach so far are looked at, where they moved as far as this in the last step [m].
+template <class S>
+S gap_looked_at(double reach_a, double reach_b, const S& moved_a, const S& moved_b) {
+  return as<S>(kNearBy * std::min(reach_a, reach_b)) + as<S>(2.0) * (moved_a + moved_b);
+}
+
+/// What is remembered from step to step: energy stored [J], where the middle of each shape was at the beginning of the last step, in three numbers
+/// of three [m], and what each touch bore, in so many: its pair, from 1; both halves of its feature; the force on b in the world's frame, and along
+/// the normal [N]. A zero ends it.
+inline constexpr std::size_t kRememberedMiddle = 1, kNumbersOfTouch = 7;
+inline std::size_t remembered_touch(std::size_t shapes) { return kRememberedMiddle + 3 * shapes; }
 
 class BodyContacts {
  public:
@@ -95,7 +111,7 @@ class BodyContacts {
   Vec3<double> force_on_b(std::size_t touch) const;
   /// Its numbers in the memory; none.
   std::span<const double> remembered(std::size_t touch) const;
-  std::size_t first_number() const { return 1 + 3 * contact_.shapes.size(); }
+  std::size_t first_number() const { return remembered_touch(contact_.shapes.size()); }
 
   const PairContact& contact_;
   std::vector<Touch> touches_;
