@@ -66,8 +66,8 @@ Boxes boxes_of(Heap heap, int count) {
   boxes.model = builder.build();
   std::vector<std::string> notes;
   boxes.effects.contact = pair_contact_of(boxes.model, notes);
-  boxes.effects.contact->stiffness = kStiffness;
-  boxes.effects.contact->friction = 0.5;
+  boxes.effects.contact->materials[0].stiffness = kStiffness;
+  boxes.effects.contact->materials[0].friction = 0.5;
   return boxes;
 }
 

@@ -12,12 +12,13 @@
 // through many steps without leaving its cache. Of an instance are kept positions, momenta, one number more a degree of freedom for each
 // sub-step (one at order 2, engine/compose/composition.hpp), with effects two more, and one a contact point. At order 2, where no effect
 // sticks, stops or saturates, the factor of a step is kept too, 52 bytes a screw: most steps do without making one
-// (engine/sweeps/lane_factor.hpp).
+// (engine/sweeps/lane_factor.hpp). Where bodies may touch each other, what their shapes remember is kept in double precision.
 //
 // Results are equal to the bit for any number of threads, any number and order of instances, any neighbours and any splitting of steps
 // into calls; with other registers (other Instructions, another kind of processor) they differ by rounding.
 //
-// Effects act as in a Simulation, on lanes and threads alike; gravity, masses, forces, servo targets and gains, friction of joints and of the
+// Effects act as in a Simulation, on lanes and threads alike, but for contact of bodies with each other: an instance in which two are near each other
+// is stepped alone, and takes as long as a Simulation. Gravity, masses, forces, servo targets and gains, friction of joints and of the
 // ground may differ from instance to instance.
 #pragma once
 

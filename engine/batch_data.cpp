@@ -9,6 +9,7 @@
 
 #include "engine/compose/composition.hpp"
 #include "engine/scene/load_model.hpp"
+#include "engine/sweeps/body_contacts.hpp"
 #include "engine/threads.hpp"
 #include "layout/support/input_error.hpp"
 
@@ -55,11 +56,11 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
       plan(*model, options, effects),
       arena(threads) {
   check_order(options.order, *model, effects);
-  if (plan.pairs) {
-    throw InputError("effects.contact: contact of bodies with each other is not stepped in a batch; expected a scene without it; step each instance as "
-                     "a simulation of its own, or leave contact out");
-  }
   require_threads(threads);
+  if (plan.pairs) {
+    BodyContacts none(*plan.effects.contact, *model);
+    no_contacts.assign(none.memory().begin(), none.memory().end());
+  }
   first_child.assign(static_cast<std::size_t>(shape().slots) + 1, 0);
   for (Index slot = 1; slot < shape().slots; ++slot) ++first_child[static_cast<std::size_t>(model->tree.parent(slot)) + 1];
   std::partial_sum(first_child.begin(), first_child.end(), first_child.begin());
@@ -72,7 +73,7 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
   const auto rows = [&](Index count_of_rows) { return static_cast<std::size_t>(blocks) * static_cast<std::size_t>(count_of_rows * lanes); };
   const double numbers = shape().positions + (plan.any() ? 4.0 : 1.0) * shape().velocities + plan.kept();
   const double words = static_cast<double>(past_rows()) + (holds_factor() ? packed_factor_words(*model) : 0);
-  const double each = numbers * sizeof(Real) + words * sizeof(std::uint32_t) + sizeof(InstanceRecord);
+  const double each = numbers * sizeof(Real) + words * sizeof(std::uint32_t) + static_cast<double>(no_contacts.size()) * sizeof(double) + sizeof(InstanceRecord);
   require_memory(fmt::format("{} instances", size), each * static_cast<double>(size));
   q.resize(rows(shape().positions));
   p.resize(rows(shape().velocities));
@@ -83,6 +84,8 @@ BatchOf<Real>::Data::Data(std::shared_ptr<const Model> shared, std::int64_t coun
     bend.assign(rows(shape().velocities), Real(kAnyBend));
   }
   kept.resize(rows(plan.kept()));
+  contacts.resize(rows(count_of(no_contacts)));
+  for (std::int64_t i = 0; i < size; ++i) forget_contacts(i);
   if (holds_factor()) {
     factor.resize(rows(packed_factor_words(*model)));
     held.resize(rows(kHeldNumbers));
@@ -128,6 +131,7 @@ Block<Real> BatchOf<Real>::Data::block(std::int64_t b) {
           .reading = rows_of(reading, nv),
           .bend = rows_of(bend, nv),
           .kept = rows_of(kept, plan.kept()),
+          .contacts = rows_of(contacts, count_of(no_contacts)),
           .instances = records.data() + b * lanes,
           .count = static_cast<int>(std::min<std::int64_t>(lanes, size - b * lanes))};
 }
@@ -148,6 +152,13 @@ void BatchOf<Real>::Data::forget_factor(std::int64_t i) {
   const HeldFactor<Real> none;
   const BatchView<Real> numbers(held, kHeldNumbers, lanes, size);
   for (Index k = 0; k < kHeldNumbers; ++k) numbers(i, k) = none.numbers()[static_cast<std::size_t>(k)];
+}
+
+template <class Real>
+void BatchOf<Real>::Data::forget_contacts(std::int64_t i) {
+  if (contacts.empty()) return;
+  const BatchView<double> numbers(contacts, count_of(no_contacts), lanes, size);
+  for (Index k = 0; k < numbers.rows(); ++k) numbers(i, k) = no_contacts[static_cast<std::size_t>(k)];
 }
 
 template <class Real>
@@ -217,6 +228,7 @@ void BatchOf<Real>::Data::start(std::int64_t i, std::span<const double> position
   clear(bend, shape().velocities, kAnyBend);
   clear(kept, plan.kept());
   forget_factor(i);
+  forget_contacts(i);
   if (!has_start.empty()) has_start[static_cast<std::size_t>(i)] = 1;
   records[static_cast<std::size_t>(i)] = {};
 }

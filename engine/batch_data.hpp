@@ -46,6 +46,8 @@ struct BatchOf<Real>::Data {
   EffectPlan plan;
   Numbers<Real> q, p, held, applied, mass, gravity, targets, gains, frictions, ground_friction, excess_before, reading, bend, kept;
   Numbers<std::uint32_t> past, factor;
+  Numbers<double> contacts;             // what bodies that touch each other remember, in double precision always
+  std::vector<double> no_contacts;      // the same of an instance at its start; empty where none can touch
   std::vector<Index> first_child, child_list;  // see children
   std::vector<InstanceRecord> records;
   Assembly neutral_start;               // of the zero configuration
@@ -66,6 +68,8 @@ struct BatchOf<Real>::Data {
   static constexpr Index kHeldNumbers = HeldFactor<Real>::kNumbers;
   /// The next step of instance i makes one of its own.
   void forget_factor(std::int64_t i);
+  /// Instance i touched nothing so far.
+  void forget_contacts(std::int64_t i);
   Block<Real> block(std::int64_t b);
   Worker& worker() const;  // of the thread that asks
 
@@ -93,6 +97,7 @@ struct BatchOf<Real>::Data {
     visit(self.reading, nv);
     visit(self.bend, nv);
     visit(self.kept, self.plan.kept());
+    visit(self.contacts, count_of(self.no_contacts));
     visit(self.factor, packed_factor_words(*self.model));
     visit(self.held, kHeldNumbers);
     each_asked(self, [&](auto& numbers, Index rows, const auto&) { visit(numbers, rows); });

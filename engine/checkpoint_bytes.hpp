@@ -51,7 +51,7 @@ struct CheckpointKind {
   const char* of;  // "simulation"
 };
 inline constexpr CheckpointKind kOfSimulation{"linden checkpoint 7\n", "linden checkpoint ", "simulation"};
-inline constexpr CheckpointKind kOfBatch{"linden batch 3\n", "linden batch ", "batch"};
+inline constexpr CheckpointKind kOfBatch{"linden batch 4\n", "linden batch ", "batch"};
 
 /// Reads one from its beginning to its end. Everything throws InputError for what does not fit.
 class CheckpointReader {

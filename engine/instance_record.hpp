@@ -15,7 +15,7 @@ struct InstanceRecord {
   std::int8_t displacements = 0;              // how many earlier displacements the first guess may use
   Index slot = 0;                             // where a frozen instance failed: body or joint; 0 = fine
   Index coupling = 0;                         // likewise, of couplings the one that was farthest open
-  std::int32_t rescued = 0;                   // steps taken alone: backtracked or split, as a Simulation would
+  std::int32_t rescued = 0;                   // steps taken alone: backtracked, split or with bodies near each other, as a Simulation would
   std::uint32_t factors = 0;                  // of the Jacobian, but for those of steps taken alone
   std::int64_t steps = 0;                     // since the start or the last reset
   std::int64_t evaluations = 0;               // of the residual, likewise

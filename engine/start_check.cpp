@@ -173,7 +173,7 @@ Field<double, 12> StartCheck::poses(const std::vector<double>& positions) const 
 
 void StartCheck::look_at_contact(StartFindings& found) const {
   if (!plan_->pairs) return;
-  BodyContacts contacts(*plan_->effects.contact, model_.constants);
+  BodyContacts contacts(*plan_->effects.contact, model_);
   contacts.find(poses(found.positions));
   std::map<std::size_t, double> depth;  // of the deepest place of a pair
   for (const BodyContacts::Touch& touch : contacts.touches()) {

@@ -74,6 +74,7 @@ double Blows::strike(State<double>& state, bool arrived, int& blows) {
     // what held a joint until the blow set it in motion is not in p
     sweeps_.momentum_read_as(velocity_, impulse_);
     effects.read_as(impulse_, state.p);
+    sweeps_.drop_lasting_contact();
   }
   return taken;
 }

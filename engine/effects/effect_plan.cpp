@@ -221,13 +221,12 @@ void EffectPlan::follow_laws(const LawSetup& setup) {
     if (list.empty()) return;
     kept_ += Law::kept_numbers(setup);
     for (const auto& entry : list) {
-      has_states = has_states || settles(entry);
+      has_states = has_states || linden::settles(entry);
       balls = balls || Law::on_ball(entry, setup);
     }
     is_implicit.template operator()<Law>(list, [&](const auto& entry) { return setup.inertia_at(entry.row); });
   });
-  has_states = has_states || pairs;
-  bends = bends || has_states;
+  bends = bends || settles();
 }
 
 void EffectPlan::put_positions(double time, std::span<double> q) const {

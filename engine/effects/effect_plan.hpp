@@ -45,6 +45,8 @@ struct EffectPlan {
   bool bends = false;    // velocities are held to how the motion bends (engine/VELOCITY.md): something has states, or acts more at
                          // the beginning of a step
   bool any() const { return joints || bodies || pairs; }
+  /// Likewise, or bodies may touch each other.
+  bool settles() const { return has_states || pairs; }
 
   Field<Index> q_row;               // position row of a screw's velocity row
   std::vector<SmoothCurve> curves;  // of every given motion

@@ -46,9 +46,7 @@ class EffectSweeps {
         body_laws_(laws_of<BodyLaws<S>>(plan.setup(model.tree))) {
     sum_.allocate(tree_.shape);  // factors of blocks add joints and bodies whichever there are
     for (Field<S>* field : {&excess_, &excess_before_, &reading_, &bend_, &reading_stiffness_}) field->allocate(tree_.shape.velocities);
-    if (plan.pairs) {
-      for (Field<S>* field : {&between_, &between_before_, &between_reading_}) field->allocate(tree_.shape.velocities);
-    }
+    if (plan.pairs) between_.allocate(tree_.shape.velocities, as<S>(0.0));
     if (plan.rotor.rows() > 0) {
       rotors_.allocate(plan.rotor.rows());
       for (Index row = 0; row < rotors_.rows(); ++row) rotors_(row) = as<S>(plan.rotor(row));
@@ -207,13 +205,11 @@ class EffectSweeps {
   auto memory() {
     const auto of_laws = [](auto&... law) { return std::tuple_cat(law.memory()...); };
     return std::apply([](const auto&... numbers) { return std::array{numbers...}; },
-                      std::tuple_cat(std::apply(of_laws, body_laws_), std::tuple(excess_before_.flat(), between_before_.flat(), between_reading_.flat(), reading_.flat(), bend_.flat()),
+                      std::tuple_cat(std::apply(of_laws, body_laws_), std::tuple(excess_before_.flat(), reading_.flat(), bend_.flat()),
                                      std::apply(of_laws, joint_laws_)));
   }
   Field<S>& excess_before() { return excess_before_; }
   Field<S>& reading() { return reading_; }
-  /// What acts between bodies has of it; no rows where nothing does.
-  const Field<S>& between_reading() const { return between_reading_; }
   Field<S>& bend() { return bend_; }
 
   /// What is kept beside the numbers of rows, EffectPlan::kept() of them: what each law keeps, those of bodies before those of joints.
@@ -284,8 +280,10 @@ class EffectSweeps {
     for (const JointMotion& one : motions().entries) excess_(one.row) = zero;  // what moves it is no stop
   }
 
-  /// Before end_reading: what acts between bodies more at the beginning of the step than at its end, half of it.
-  void add_to_reading(const Field<S>& excess) { std::ranges::copy(excess.flat(), between_.flat().begin()); }
+  /// Before end_reading: half of what lasted between bodies, all of which acts at the beginning of steps; none.
+  void add_to_reading(std::span<const double> lasting) {
+    for (Index row = 0; row < between_.rows(); ++row) between_(row) = lasting.empty() ? S(0.0) : as<S>(lasting[static_cast<std::size_t>(row)]);
+  }
   /// At the end of a step, once the bodies are where it leaves them: what velocities are read from beside p (engine/VELOCITY.md).
   /// `moves`: in which instances. before: displacement of the step before, as long as this one, where that is `known`. scratch, projected:
   /// 6 x n, nv.
@@ -298,10 +296,6 @@ class EffectSweeps {
       std::ranges::copy(bodies_.start_excess.flat(), scratch.flat().begin());
       impulse_up(tree_, constants, placement, scratch, projected);
     }
-    for (Index row = 0; row < between_.rows(); ++row) {
-      between_reading_(row) = select(moves, persistent(between_(row), between_before_(row)), between_reading_(row));
-      between_before_(row) = select(moves, between_(row), between_before_(row));
-    }
     auto stopped = zero > zero;  // a limit has stopped a joint, and changed all velocities
     for (Index row = 0; row < reading_.rows(); ++row) {
       S read = plan_.joints ? excess_(row) : zero;
@@ -310,7 +304,7 @@ class EffectSweeps {
         read = select(read > most, read, read + persistent(projected(row), excess_before_(row)));
         excess_before_(row) = select(moves, projected(row), excess_before_(row));
       }
-      if (plan_.pairs) read = select(read > most, read, read + between_reading_(row));
+      if (plan_.pairs) read = select(read > most, read, read + between_(row));
       reading_(row) = select(moves, read, reading_(row));
     }
     for (Index row = 0; plan_.bends && row < bend_.rows(); ++row) {
@@ -363,7 +357,6 @@ class EffectSweeps {
   void read_as(const Field<S>& momentum, const Field<S>& p) {
     for (Index row = 0; row < p.rows(); ++row) reading_(row) = momentum(row) - p(row);
     for (const JointMotion& motion : motions().entries) reading_(motion.row) = S(kHeld);
-    std::ranges::fill(between_reading_.flat(), S(0.0));
     forget_bends();
   }
   const Limits<S>& limits() const { return law<LimitsLaw<S>>().limits(); }
@@ -377,7 +370,7 @@ class EffectSweeps {
     const auto forgets = [](auto& law) { law.forget(); };
     each_law(body_laws_, forgets);
     each_law(joint_laws_, forgets);
-    for (Field<S>* field : {&excess_before_, &between_before_, &between_reading_, &reading_}) std::ranges::fill(field->flat(), S(0.0));
+    for (Field<S>* field : {&excess_before_, &reading_}) std::ranges::fill(field->flat(), S(0.0));
     std::ranges::fill(bend_.flat(), as<S>(kAnyBend));
   }
 
@@ -454,9 +447,7 @@ class EffectSweeps {
   const Tree& tree_;
   S h_{};
   double stiction_speed_ = 0;
-  Field<S> between_;           // see add_to_reading; no rows where nothing acts between bodies, likewise below
-  Field<S> between_before_;    // the same of the step before
-  Field<S> between_reading_;   // what of it lasted, in reading_
+  Field<S> between_;           // see add_to_reading; no rows where nothing acts between bodies
   Field<S> excess_;            // what acts at the beginning of the step more than at its end, half of it; kHeld where a joint is held
   Field<S> excess_before_;     // the same of bodies, seen from the joints, of the step before
   Field<S> reading_;           // what velocities are read from beside p; kHeld where a joint is held

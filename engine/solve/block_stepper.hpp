@@ -34,6 +34,7 @@ struct Block {
   Real* reading;              // [nv] likewise
   Real* bend;                 // [nv] likewise
   Real* kept;                 // [EffectPlan::kept] (EffectSweeps::kept); null: none
+  double* contacts;           // [numbers] BodyContacts::memory of each instance; null: bodies do not touch each other
   InstanceRecord* instances;  // [W]
   int count;                  // instances in use, 1 to W
 };

@@ -30,6 +30,8 @@ class InstanceStepper {
   void forget();
   /// To set effects, and what they keep: to be written before a step and read after it.
   EffectControls controls() { return stepper_->controls(); }
+  /// Likewise; of contacts of bodies with each other.
+  std::span<double> contact_memory() { return stepper_->contact_memory(); }
 
   /// One step of the state, from `time` on; after one that failed the state is no more what it was. The latest row of state().history and
   /// state().last_step say what is known of the step before.

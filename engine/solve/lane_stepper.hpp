@@ -11,8 +11,8 @@
 // Every instruction that a lane's result depends on is the same in any company, so results are equal to the bit in any block, any place and
 // with any number of threads.
 //
-// A lane that is given up, that may have landed on another root (judge.hpp) or strikes a limit that it bounces off is stepped alone, with
-// all that a Simulation can do (InstanceStepper); if that fails too it is frozen at its last good state.
+// A lane that is given up, that may have landed on another root (judge.hpp), strikes a limit that it bounces off or has bodies that are near each
+// other and may touch (lane_contacts.hpp) is stepped alone, with all that a Simulation can do (InstanceStepper); if that fails too it is frozen at its last good state.
 #pragma once
 
 #include <array>
@@ -68,13 +68,32 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     if constexpr (kEffects) {
       if (!sweeps_.effects().plan().curves.empty()) return observe_alone(block, velocities, energy);
     }
+    Lanes alone = 0;
+    std::array<Energy, W> seen;
+    if constexpr (kEffects) {
+      if (energy != nullptr) alone = sweeps_.contacts().lasting(block);
+      for (Lanes left = alone; left != 0; left &= left - 1) {
+        const int l = std::countr_zero(left);
+        take_out(block, l);
+        seen[static_cast<std::size_t>(l)] = alone_.observe();
+      }
+    }
     if (!stepped && energy != nullptr) sweeps_.refresh();
     if (!stepped && energy == nullptr) sweeps_.place();
-    if (energy != nullptr) L::store(sweeps_.potential(), energy + W);
+    if (energy != nullptr) {
+      Pack potential = sweeps_.potential();
+      if constexpr (kEffects) potential = potential + sweeps_.contacts().stored(block);
+      L::store(potential, energy + W);
+    }
     sweeps_.read_velocity();
     if (energy != nullptr) L::store(kinetic_energy(), energy);
     if constexpr (kEffects) sweeps_.effects().follow_motion(block, number(1 / options_.step), work_.increment);
     for (Index row = 0; row < tree_.shape.velocities; ++row) L::store(work_.increment(row), velocities + row * W);
+    for (Lanes left = alone; left != 0; left &= left - 1) {
+      const auto l = static_cast<std::size_t>(std::countr_zero(left));
+      energy[l] = static_cast<Real>(seen[l].kinetic);
+      energy[W + l] = static_cast<Real>(seen[l].potential);
+    }
   }
 
  private:
@@ -117,11 +136,13 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   Lanes step_once(const Block<Real>& block, Lanes alive) {
     const bool staged = stages_.size() > 1;
     if (staged) keep_start();
-    Lanes together = alive, frozen = 0;
+    Lanes together = alive, frozen = 0, near = 0;
+    if constexpr (kEffects) near = sweeps_.near(block, alive);
     for (std::size_t stage = 0; stage < stages_.size() && together != 0; ++stage) {
       if (staged) sweeps_.use_step(stages_[stage] * options_.step);
       std::uint32_t* const past = block.past + stage * static_cast<std::size_t>(tree_.shape.velocities * kWords);
-      const Lanes done = solve(block, together, past);
+      const Lanes free = together & ~near;
+      const Lanes done = free != 0 ? solve(block, free, past) : 0;
       frozen |= step_lost(block, together & ~done);
       sweeps_.end(block, done);
       if (done != 0) remember_displacement(block, done, past);
@@ -194,7 +215,10 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     take(sweeps_.p(), state.p.flat());
     if (sweeps_.applied() != nullptr) take(*sweeps_.applied(), alone_.applied());
     if (block.gravity != nullptr) alone_.use_gravity(sweeps_.own_gravity(block)[static_cast<std::size_t>(l)]);
-    if constexpr (kEffects) sweeps_.effects().take_out(block, l, alone_.controls());
+    if constexpr (kEffects) {
+      sweeps_.effects().take_out(block, l, alone_.controls());
+      sweeps_.contacts().take_out(block, l, alone_.contact_memory());
+    }
     if (block.mass != nullptr) {
       Field<double, 10>& inertia = alone_.own_constants().inertia;
       for (Index i = 0; i < inertia.rows(); ++i) {
@@ -223,7 +247,10 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   /// had been as long as a step. Of sub-steps nothing is kept.
   void keep_alone(const Block<Real>& block, int l) {
     sweeps_.factor().drop(l);
-    if constexpr (kEffects) sweeps_.effects().keep_alone(block, l, alone_.controls());
+    if constexpr (kEffects) {
+      sweeps_.effects().keep_alone(block, l, alone_.controls());
+      sweeps_.contacts().keep_alone(block, l, alone_.contact_memory());
+    }
     block.instances[l].displacements = 0;
     if (stages_.size() > 1) return;
     std::array<std::int32_t, W> known;

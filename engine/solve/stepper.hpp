@@ -74,6 +74,9 @@ class Stepper {
   /// What effects, or the solver, keep from step to step beside the state: part of a checkpoint.
   virtual std::vector<std::span<double>> memory() = 0;
 
+  /// Of these what contacts of bodies with each other keep (engine/sweeps/body_contacts.hpp); empty without.
+  virtual std::span<double> contact_memory() = 0;
+
   /// The velocity of the motion at the positions of the last refresh or step, see engine/VELOCITY.md: M(q)^-1 p where nothing acts
   /// but potentials; else p is read with the effects' impulses taken half at each end of the last step, what they hold is at rest, and no
   /// velocity is farther from the mean one of that step than the motion bends.

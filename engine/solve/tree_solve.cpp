@@ -140,7 +140,7 @@ bool TreeSolve<kEffects>::stale(const Evaluated<double>& now, double before) con
 
 template <bool kEffects>
 bool TreeSolve<kEffects>::has_states() const {
-  if constexpr (kEffects) return sweeps_.effects().plan().has_states;
+  if constexpr (kEffects) return sweeps_.effects().plan().settles();
   return false;
 }
 

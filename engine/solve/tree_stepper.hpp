@@ -53,6 +53,7 @@ class TreeStepper final : public Stepper {
   Assembly assemble(State<double>& state) override { return sweeps_.assemble(state.q); }
   EffectControls controls() override;
   std::vector<std::span<double>> memory() override;
+  std::span<double> contact_memory() override { return sweeps_.contact_memory(); }
   void read_velocity(const State<double>& state, Field<double>& v) override;
   void momentum_of(Field<double>& v, Field<double>& p) override {
     sweeps_.close_velocities(v);

@@ -13,15 +13,11 @@
 namespace linden {
 namespace {
 
-/// Of their size by which shapes may be apart to be looked at, whatever they do.
-constexpr double kNearBy = 0.02;
-
 /// Contacts that are remembered, for each shape; no shape is touched at more places at once.
 constexpr std::size_t kMostOfShape = 32;
 
-/// Numbers of one: its pair, from 1; both halves of its feature; the force on b in the world's frame, and of the spring alone [N]; how deep that is
-/// pressed [m].
-constexpr std::size_t kNumbers = 8, kForce = 3, kSpring = 6, kDepth = 7;
+/// Numbers of one.
+constexpr std::size_t kNumbers = kNumbersOfTouch, kForce = 3, kSpring = 6, kDepth = 7;
 
 Vec3<double> vector(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
@@ -60,7 +56,8 @@ std::array<double, 9> directions_of(const Vec3<double>& n) {
 
 }  // namespace
 
-BodyContacts::BodyContacts(const PairContact& contact, const BodyConstants<double>& bodies) : contact_(contact) {
+BodyContacts::BodyContacts(const PairContact& contact, const Model& model) : contact_(contact), rows_(static_cast<std::size_t>(model.tree.shape.velocities)) {
+  const BodyConstants<double>& bodies = model.constants;
   const auto mass = [&](std::size_t shape) {
     const Index slot = contact.shapes[shape].slot;
     if (slot == 0) return std::numeric_limits<double>::infinity();
@@ -83,7 +80,7 @@ BodyContacts::BodyContacts(const PairContact& contact, const BodyConstants<doubl
 
 void BodyContacts::forget() {
   std::ranges::fill(memory_, 0.0);
-  std::fill_n(memory_.begin() + 1, 3 * contact_.shapes.size(), std::numeric_limits<double>::quiet_NaN());
+  std::fill_n(memory_.begin() + kRememberedMiddle, 3 * contact_.shapes.size(), std::numeric_limits<double>::quiet_NaN());
   forces_.clear();
 }
 
@@ -94,7 +91,7 @@ bool BodyContacts::find(const Field<double, 12>& pose) {
   for (std::size_t k = 0; k < shapes; ++k) {
     const ConvexBody& shape = contact_.shapes[k];
     poses_[k] = pose_of(placed_in(load<Placement, double>(pose, shape.slot), placement(shape.pose)));
-    const Vec3<double> step = vector(poses_[k].shift.data()) - vector(&memory_[1 + 3 * k]);
+    const Vec3<double> step = vector(poses_[k].shift.data()) - vector(&memory_[kRememberedMiddle + 3 * k]);
     const double distance = std::sqrt(dot(step, step));
     if (std::isfinite(distance)) moved[k] = distance;
   }
@@ -112,7 +109,7 @@ bool BodyContacts::find(const Field<double, 12>& pose) {
   for (const auto& [a, b] : broad_phase_.pairs(bounds_, 0)) {
     const std::size_t pair = number_of(a, b);
     if (pair == contact_.pairs.size()) continue;
-    add(pair, kNearBy * std::min(reach_[a], reach_[b]) + 2 * (moved[a] + moved[b]), pose);
+    add(pair, gap_looked_at(reach_[a], reach_[b], moved[a], moved[b]), pose);
   }
   couplings_.resize(touches_.size());
   steps_.resize(touches_.size());
@@ -232,7 +229,7 @@ std::vector<TouchImpulse> BodyContacts::impulses(double h) const {
 
 void BodyContacts::remember() {
   for (std::size_t k = 0; k < poses_.size(); ++k) {
-    std::ranges::copy(poses_[k].shift, memory_.begin() + static_cast<std::ptrdiff_t>(1 + 3 * k));
+    std::ranges::copy(poses_[k].shift, memory_.begin() + static_cast<std::ptrdiff_t>(kRememberedMiddle + 3 * k));
   }
   std::size_t at = first_number();
   for (std::size_t k = 0; k < touches_.size() && at < memory_.size(); ++k) {

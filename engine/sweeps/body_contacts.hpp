@@ -29,9 +29,11 @@
 #include "engine/effects/step_impulses.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
 #include "kernels/collision/broad_phase.hpp"
-#include "layout/body_constants.hpp"
+#include "kernels/effects/joint_impulses.hpp"
+#include "kernels/values/scalar.hpp"
 #include "layout/effects/contact.hpp"
 #include "layout/field.hpp"
+#include "layout/model.hpp"
 #include "layout/pose.hpp"
 
 namespace linden {
@@ -41,6 +43,20 @@ inline constexpr double kRecoverySpeed = 1e-2;
 
 /// What comes together more slowly does not bounce [m/s]. Of what strikes faster a thousandth of the speed is at most lost beside its restitution.
 inline constexpr double kLeastRebound = 0.05, kRigid = 1e6;
+
+/// Of their size by which shapes may be apart to be looked at, whatever they do.
+inline constexpr double kNearBy = 0.02;
+/// Up to which gap two shapes that reach so far are looked at, where they moved as far as this in the last step [m].
+template <class S>
+S gap_looked_at(double reach_a, double reach_b, const S& moved_a, const S& moved_b) {
+  return as<S>(kNearBy * std::min(reach_a, reach_b)) + as<S>(2.0) * (moved_a + moved_b);
+}
+
+/// What is remembered from step to step: energy stored [J]; whether something lasted; where the middle of each shape was at the beginning of the last
+/// step, in three numbers [m]; what lasted, along each of `rows` velocities; and what each touch bore, in so many: its pair, from 1; both halves of its
+/// feature; the force on b in the world's frame, and of the spring alone [N]; how deep that is pressed [m]. A zero ends it.
+inline constexpr std::size_t kLasted = 1, kRememberedMiddle = 2, kNumbersOfTouch = 8;
+inline std::size_t remembered_touch(std::size_t shapes, std::size_t rows) { return kRememberedMiddle + 3 * shapes + rows; }
 
 class BodyContacts {
  public:
@@ -55,8 +71,8 @@ class BodyContacts {
   /// What it bore in the last step, along `across` [N]: two across, one along the normal.
   using Force = std::array<double, 3>;
 
-  /// Of a model with these bodies, by which rigid contact goes. The contact must outlive this.
-  BodyContacts(const PairContact& contact, const BodyConstants<double>& bodies);
+  /// Of this model. The contact must outlive this.
+  BodyContacts(const PairContact& contact, const Model& model);
 
   /// At these poses of the bodies. Whether the contacts are others than those of the last time.
   bool find(const Field<double, 12>& pose);
@@ -74,6 +90,8 @@ class BodyContacts {
     const double stored_before = stored();
     memory_[0] = stored_of_last();
     forces_.resize(touches_.size());
+    lasting_.resize(touches_.size());
+    memory_[kLasted] = 0;
     for (std::size_t k = 0; k < touches_.size(); ++k) {
       const std::array<double, 3> impulse = solved.impulse_of(k), opens = solved.opens(k, before, now);
       double given = 0;
@@ -83,11 +101,23 @@ class BodyContacts {
       }
       steps_[k].depth = steps_[k].depth_of(impulse[2]);
       memory_[0] += 0.25 * steps_[k].spring() * steps_[k].depth;
+      const std::array<double, 3> last = guess_of(k, h);
+      for (std::size_t j = 0; j < 3; ++j) {
+        lasting_[k][j] = persistent(impulse[j], last[j]);
+        memory_[kLasted] = lasting_[k][j] != 0 ? 1 : memory_[kLasted];
+      }
       if (given != 0) book(couplings_[k].slot_b, -given);
     }
     if (stored() != stored_before) book(0, stored_before - stored());
     remember();
   }
+  /// Whether something pushed in the step solved last as in that before: velocities are read with half of it (engine/VELOCITY.md). Of each touch,
+  /// along its rows, times h, until the next step begins; and what becomes of it, along each velocity [N m s, N s], which is remembered.
+  bool lasted() const { return memory_[kLasted] != 0; }
+  std::span<const Force> lasting() const { return lasting_; }
+  std::span<double> lasting_push() { return std::span(memory_).subspan(remembered_touch(contact_.shapes.size(), 0), rows_); }
+  /// A blow has changed all velocities.
+  void drop_lasting() { memory_[kLasted] = 0; }
   /// At the end of the last step, potential of what is pressed [J].
   double stored() const { return memory_[0]; }
   /// Between the shapes of a touch in the step solved last [N], as Touch::across has it; empty before the first.
@@ -121,18 +151,19 @@ class BodyContacts {
   /// What is remembered of a pair's contacts, one after the other; of one of them, or nothing.
   std::span<const double> remembered_of_pair(std::size_t pair) const;
   std::span<const double> remembered(std::size_t touch) const;
-  std::size_t first_number() const { return 1 + 3 * contact_.shapes.size(); }
+  std::size_t first_number() const { return remembered_touch(contact_.shapes.size(), rows_); }
   /// A number of the effect's pairs; none: their number.
   std::size_t number_of(std::uint32_t a, std::uint32_t b) const;
   void add(std::size_t pair, double margin, const Field<double, 12>& pose);
 
   const PairContact& contact_;
+  std::size_t rows_;             // of velocities
   std::vector<double> lighter_;  // of each pair, of both bodies [kg]
   std::vector<Touch> touches_;
   std::vector<Step> steps_;      // of each
   std::vector<Coupling> couplings_;
-  std::vector<Force> forces_;
-  std::vector<double> memory_;  // what is stored, middles of shapes at the beginning of the last step, what each contact bore
+  std::vector<Force> forces_, lasting_;
+  std::vector<double> memory_;   // see remembered_touch
   std::vector<double> reach_;   // of each shape, from its middle [m]
   std::vector<Pose> poses_;     // of each shape, in the world
   std::vector<std::size_t> first_pair_;  // of each shape, of those that it is the first of

@@ -24,6 +24,7 @@
 #include "engine/solve/block_stepper.hpp"
 #include "engine/solve/judge.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
+#include "engine/sweeps/lane_contacts.hpp"
 #include "engine/sweeps/lane_factor.hpp"
 #include "kernels/block/advance_down.hpp"
 #include "kernels/block/block_factor_up.hpp"
@@ -51,7 +52,7 @@ class LaneSweeps {
 
   explicit LaneSweeps(const BlockSetup<Real>& setup)
       : tree_(setup.model.tree), options_(setup.options), constants_(setup.constants), step_(options_.step), effects_(setup),
-        couplings_(setup.model, setup.plan.row_yields), factor_(setup.model, setup.holds_factor) {
+        contacts_(setup.model.tree, setup.plan), couplings_(setup.model, setup.plan.row_yields), factor_(setup.model, setup.holds_factor) {
     const Shape& shape = tree_.shape;
     work_.allocate(shape);
     if constexpr (!kEffects) kept_.allocate(shape);
@@ -141,6 +142,18 @@ class LaneSweeps {
     return stored;
   }
 
+  /// Contacts of bodies with each other: of a step in lanes there are none.
+  LaneContacts<Pack>& contacts()
+    requires kEffects
+  {
+    return contacts_;
+  }
+  Lanes near(const Block<Real>& block, Lanes alive)
+    requires kEffects
+  {
+    return contacts_.near(block, work_.placement, alive);
+  }
+
   void find_target() { momentum_target_map(tree_, number(step_), p_, work_.force, work_.momentum_target); }
 
   /// The evaluation of the first guess in work().delta. Without effects nobody judges it (kSmoothBlock): of what start_down finds on its way
@@ -227,7 +240,10 @@ class LaneSweeps {
   /// The end of a step in these lanes, whose displacement in coordinates is in work().delta.
   void end([[maybe_unused]] const Block<Real>& block, Lanes done) {
     const Mask moves = L::mask(done);
-    if constexpr (kEffects) effects_.end(block, done, work_);
+    if constexpr (kEffects) {
+      effects_.end(block, done, work_);
+      contacts_.end(block, done);
+    }
     if (couplings_.gives_way()) {
       find_gaps(Asked::rows);  // of lanes that were brought back
       couplings_.end(step_);
@@ -487,6 +503,7 @@ class LaneSweeps {
   Lanes slow_ = 0;     // lanes in which a correction left too much
   Field<Pack> q_, p_, applied_;
   [[no_unique_address]] std::conditional_t<kEffects, LaneEffects<Pack>, NoLaneEffects> effects_;
+  [[no_unique_address]] std::conditional_t<kEffects, LaneContacts<Pack>, NoLaneContacts> contacts_;
   CouplingSweeps<Pack> couplings_;
   LaneFactor<Pack> factor_;
 };

@@ -28,7 +28,7 @@ Strategy strategy_of(const Model& model, const Options& options, const EffectPla
   strategy.gravity = options.gravity != std::array<double, 3>{0, 0, 0};
   strategy.one_pass = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && model.couplings.empty() && !plan.pairs;
   strategy.reuses_factor = options.solver == Solver::newton && options.stop == StopTest::energy && model.mimics.empty() && options.order == 2 &&
-                           options.guess == FirstGuess::extrapolation && !plan.has_states;
+                           options.guess == FirstGuess::extrapolation && !plan.settles();
   if (plan.any() || !strategy.one_pass) return strategy;
   strategy.order = Order::branches;
   if (options.order != 2) return strategy;

@@ -196,10 +196,9 @@ const Field<double>& TreeSweeps<kEffects>::read_velocity(const Field<double>& p,
 template <bool kEffects>
 double TreeSweeps<kEffects>::late_in_reading(const Field<double>& v) {
   if constexpr (kEffects) {
-    const Field<double>& lasted = effects_.between_reading();
-    if (std::ranges::all_of(lasted.flat(), [](double push) { return push == 0; })) return 0;
-    // 1/2 (p - c).M^-1 (p - c) - 1/2 p.M^-1 p
-    work_.momentum = lasted;
+    if (!contacts_ || !contacts_->lasted()) return 0;
+    // 1/2 (p - b).M^-1 (p - b) - 1/2 p.M^-1 p
+    std::ranges::copy(contacts_->lasting_push(), work_.momentum.flat().begin());
     fold_mimics(ties_.mimics(), work_.momentum);
     apply_mass_inverse(work_.momentum, work_.increment, nullptr, Coupled::reading);
     double sum = 0;

@@ -28,7 +28,7 @@ TreeSweeps<kEffects>::TreeSweeps(const Model& model, const Options& options, con
   if (!plan.effects.motions.empty()) given_.allocate(model.tree.shape.velocities);
   couplings_.emplace(model, row_yields_, strategy_.reuses_factor ? Serves::steps_that_follow : Serves::till_the_next);
   if (plan.pairs) {
-    contacts_.emplace(*plan.effects.contact, model.constants);
+    contacts_.emplace(*plan.effects.contact, model);
     pose_.allocate(model.tree.shape.slots);
   }
 }

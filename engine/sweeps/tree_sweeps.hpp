@@ -168,7 +168,12 @@ class TreeSweeps {
   /// the step before; book(slot, what they took [J]).
   template <class Book>
   void end_contacts(double h, const Field<double>& before, const Book& book) {
-    if (contacts_) contacts_->keep(h, *couplings_, before, work_.delta, book);
+    if (!contacts_) return;
+    contacts_->keep(h, *couplings_, before, work_.delta, book);
+    if (!contacts_->lasted()) return;
+    std::ranges::fill(work_.momentum.flat(), 0.0);
+    couplings_->push_contacts(0.5 / h, contacts_->lasting(), work_.momentum);
+    std::ranges::copy(work_.momentum.flat(), contacts_->lasting_push().begin());
   }
   /// Then, while bodies are where they were: what contacts pushed.
   template <class Account>
@@ -182,6 +187,10 @@ class TreeSweeps {
   double contact_potential() const { return contacts_ ? contacts_->stored() : 0; }
   bool has_contacts() const { return contacts_.has_value(); }
   std::span<double> contact_memory() { return contacts_ ? contacts_->memory() : std::span<double>(); }
+  /// A blow has changed all velocities.
+  void drop_lasting_contact() {
+    if (contacts_) contacts_->drop_lasting();
+  }
   void forget_contacts() {
     if (contacts_) contacts_->forget();
   }
@@ -202,13 +211,9 @@ class TreeSweeps {
   /// with LINDEN_POISON.
   void poison_scratch();
   /// At the end of a step with effects: what velocities are read from beside p.
-  void end_reading(double h, const Field<double>& before, bool known) {
+  void end_reading(const Field<double>& before, bool known) {
     if constexpr (kEffects) {
-      if (contacts_) {
-        std::ranges::fill(work_.momentum.flat(), 0.0);
-        couplings_->add_contacts(0.5 / h, work_.momentum);
-        effects_.add_to_reading(work_.momentum);
-      }
+      if (contacts_) effects_.add_to_reading(contacts_->lasted() ? std::span<const double>(contacts_->lasting_push()) : std::span<const double>());
       effects_.end_reading(*constants_, work_.placement, true, work_.delta, before, known, work_.impulse, work_.increment);
     }
   }

@@ -167,8 +167,10 @@ def test_bodies_push_each_other() -> None:
     assert {(contact.body, contact.other) for contact in between} == {("above/crate", "below/crate")}
     assert sum(contact.force[2] for contact in between) == pytest.approx(204 * 9.81, abs=0.02)
     assert all(contact.normal[2] == pytest.approx(1, abs=1e-3) for contact in between)
-    with pytest.raises(linden.InputError, match="effects.contact"):
-        linden.Batch(scene, 2)
+    batch = linden.Batch(scene, 2, observe=["q", "energy"])
+    batch.step(1501)
+    np.testing.assert_allclose(batch.q, np.tile(sim.positions, (2, 1)), atol=1e-6)
+    assert (batch.rescued > 1000).all()
 
 
 def test_contacts_are_asked_for_before_the_step() -> None:

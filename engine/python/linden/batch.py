@@ -282,7 +282,7 @@ class Batch:
 
     @property
     def rescued(self) -> NDArray[np.int32]:
-        """Steps that were taken alone, split or backtracked, likewise [N]."""
+        """Steps that were taken alone, split, backtracked or with bodies near each other, likewise [N]."""
         return self._core.rescued  # type: ignore[no-any-return]
 
     # -- what differs from instance to instance
