@@ -71,6 +71,7 @@ class TouchingMaker {
       case Deed::wedged: make_wedged(); break;
       case Deed::arm: make_arm(); break;
     }
+    stiffen();
     build();
     make_effects();
     const bool ends = deed_ == Deed::rests || deed_ == Deed::stack || deed_ == Deed::wedged || deed_ == Deed::on_ground;
@@ -267,6 +268,14 @@ class TouchingMaker {
     const Vector3d top(one.at.x(), either_way(0.1), 0);
     set_on(one, top, up_, small_gap());
     solids_.push_back(one);
+  }
+
+  /// Faces of more than four corners have a stiffness that goes by how many places stand for them: it is to be too high for steps to tell.
+  void stiffen() {
+    double mass = 0;
+    for (const Solid& one : solids_) mass += one.mass;
+    const auto many = [](const Solid& one) { return one.shape.kind == ConvexKind::cylinder || one.shape.kind == ConvexKind::hull; };
+    if (std::ranges::any_of(solids_, many) || solids_.size() > 1) stiffness_ = std::max(stiffness_, std::min(1e9, 30 * mass / (h_ * h_)));
   }
 
   void build() {
