@@ -15,6 +15,7 @@ std::string_view name(Check check) {
     case Check::velocity: return "velocity";
     case Check::bits: return "bits";
     case Check::observations: return "observations";
+    case Check::contact: return "contact";
   }
   return "";
 }
@@ -31,6 +32,7 @@ std::vector<Difference> differences(const EverydayScene& scene, std::optional<Ch
   if (found.asked(Check::position)) check_position(scene, found);
   if (found.asked(Check::bits)) check_bits(scene, found);
   if (found.asked(Check::observations)) check_observations(scene, found);
+  if (found.asked(Check::contact) && scene.effects.contact) check_contact(scene, found);
   return found.list;
 }
 

@@ -33,5 +33,7 @@ void check_velocities(const EverydayScene& scene, const Walk& walk, Differences&
 void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found);
 void check_bits(const EverydayScene& scene, Differences& found);
 void check_observations(const EverydayScene& scene, Differences& found);
+/// What is told of bodies that touch each other.
+void check_contact(const EverydayScene& scene, Differences& found);
 
 }  // namespace linden

@@ -25,7 +25,7 @@ struct Asked {
   std::uint64_t scenes = 2000, seed = 1, first = 1;
   int threads = 0;
   std::optional<Check> only;
-  bool verbose = false;
+  bool verbose = false, touching = false;
 };
 
 Asked asked(int argc, char** argv, bool& help) {
@@ -36,7 +36,8 @@ Asked asked(int argc, char** argv, bool& help) {
   program.add_option("--seed", result.seed, "All scenes follow from it (1)");
   program.add_option("--first", result.first, "Number of the first scene (1)");
   program.add_option("--threads", result.threads, "0: all that the machine has (0)");
-  program.add_option("--only", only, "One check: refused, position, energy, rest, velocity, bits or observations");
+  program.add_option("--only", only, "One check: refused, position, energy, rest, velocity, bits, observations or contact");
+  program.add_flag("--touching", result.touching, "Only scenes in which bodies touch each other: one in six of the numbers");
   program.add_flag("--verbose", result.verbose, "Tell every scene, also where nothing differs");
   try {
     program.parse(argc, argv);
@@ -51,7 +52,7 @@ Asked asked(int argc, char** argv, bool& help) {
     const auto found = std::ranges::find(kChecks, only, [](Check check) { return name(check); });
     if (found == kChecks.end()) {
       throw InputError(
-          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity, bits or observations", quoted(only)));
+          fmt::format("--only {}: no such check; expected refused, position, energy, rest, velocity, bits, observations or contact", quoted(only)));
     }
     result.only = *found;
   }
@@ -78,17 +79,14 @@ class Teller {
   void tell(std::uint64_t at, const EverydayScene& scene, const std::vector<Difference>& list) {
     const std::string text = text_of(scene, list, what_.verbose);
     const std::lock_guard lock(mutex_);
-    lines_[at] = text;
-    ready_[at] = 1;
     differing_ += list.empty() ? 0 : 1;
     for (const Difference& one : list) ++counts_[{one.check, one.what}];
-    if (next_ < ready_.size() && ready_[next_] != 0) progress_.erase();
-    for (; next_ < ready_.size() && ready_[next_] != 0; ++next_) {
-      fmt::print("{}", lines_[next_]);
-      lines_[next_].clear();
-    }
-    std::fflush(stdout);
-    progress_.update(static_cast<std::int64_t>(++done_), Progress::Clock::now());
+    tell(at, text);
+  }
+  /// It was not asked for.
+  void pass(std::uint64_t at) {
+    const std::lock_guard lock(mutex_);
+    tell(at, "");
   }
 
   std::uint64_t finish() {
@@ -98,6 +96,18 @@ class Teller {
   }
 
  private:
+  void tell(std::uint64_t at, const std::string& text) {
+    lines_[at] = text;
+    ready_[at] = 1;
+    if (next_ < ready_.size() && ready_[next_] != 0) progress_.erase();
+    for (; next_ < ready_.size() && ready_[next_] != 0; ++next_) {
+      fmt::print("{}", lines_[next_]);
+      lines_[next_].clear();
+    }
+    std::fflush(stdout);
+    progress_.update(static_cast<std::int64_t>(++done_), Progress::Clock::now());
+  }
+
   const Asked& what_;
   std::vector<std::string> lines_;
   std::vector<char> ready_;
@@ -129,6 +139,7 @@ int run_everyday(int argc, char** argv) {
           for (std::uint64_t at = range.begin(); at < range.end(); ++at) {
             // a wait within must not take up another scene
             oneapi::tbb::this_task_arena::isolate([&] {
+              if (what.touching && !touches(what.first + at)) return teller.pass(at);
               const EverydayScene scene = everyday_scene(what.seed, what.first + at);
               teller.tell(at, scene, tried(scene, what.only));
             });

@@ -165,8 +165,12 @@ void check_position(const EverydayScene& scene, Differences& found) {
   } else if (!(error <= (scene.sudden ? 4 : 20) * bound + floor)) {
     differs((scene.sudden ? 4 : 20) * bound + floor, error, 1);
   } else if (error > 0.25 * bound + floor) {
-    // at a quarter of the step a quarter is left, or less; events may fall anywhere within steps
-    const double quarter = error_of(4);
+    // at a quarter of the step a quarter is left, or less; events may fall anywhere within steps; bodies that touch give way as those steps have it
+    PlainScene finer = start;
+    finer.ease_contact(h / 4);
+    const std::vector<VectorXd> engine = looks(scene, 4);
+    if (engine.empty()) return;
+    const double quarter = apart(scene, tree, scene.effects.contact ? track(finer, scene, 2 * parts).q : plain.q, engine);
     if (quarter > 0.6 * error + floor && std::isfinite(quarter)) differs(0.6 * error + floor, quarter, 4);
   }
 }
@@ -199,14 +203,15 @@ double friction_leaves(const EverydayScene& scene, const Walk& walk) {
 /// What a limit takes within a step it takes along the mean of two displacements, between which bodies turn: of that work, the turn. Ground
 /// has its friction at the beginning of a step, as joints have: first order, what it takes in one.
 double stops_leave(const EverydayScene& scene, const Walk& walk) {
-  double limits = 0, ground = 0;
+  double limits = 0, ground = 0, contact = 0;
   for (std::size_t k = 1; k < walk.nodes.size(); ++k) {
     const Node &before = walk.nodes[k - 1], &now = walk.nodes[k];
     const double turn = scene.options.step * std::max(size_of(*scene.model, before.v), size_of(*scene.model, now.v));
     limits += std::abs(now.work.of<JointLimit>() - before.work.of<JointLimit>()) * std::min(1.0, turn);
     ground = std::max(ground, std::abs(now.work.of<Ground>() - before.work.of<Ground>()));
+    contact = std::max(contact, std::abs(now.work.of<PairContact>() - before.work.of<PairContact>()));
   }
-  return limits + ground;
+  return limits + ground + contact;
 }
 
 /// What drives a given motion does so at the beginning of a step: of its work, what that changes by from one step to the next.
@@ -316,6 +321,7 @@ void check_energy(const EverydayScene& scene, const Walk& walk, Differences& fou
   gives.operator()<JointLimit>("a limit", !scene.effects.limits.empty());
   gives.operator()<Drag>("drag", !scene.effects.drag.empty() && scene.effects.wind == std::array<double, 3>{0, 0, 0});
   gives.operator()<Ground>("ground", scene.effects.ground.has_value());
+  gives.operator()<PairContact>("contact", scene.effects.contact.has_value());
 }
 
 namespace {
@@ -467,7 +473,7 @@ void check_velocities(const EverydayScene& scene, const Walk& walk, Differences&
 }
 
 void check_batch_velocities(const EverydayScene& scene, const Walk& walk, Differences& found) {
-  if (!walk.failed.ok()) return;
+  if (!walk.failed.ok() || scene.effects.contact) return;
   Batch batch(scene.model, 1, scene.options, scene.effects, {.threads = 1});
   batch.reset(0, scene.start.positions, scene.start.velocities);
   const Reader reader(scene, walk, "batch");

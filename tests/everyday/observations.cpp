@@ -120,7 +120,9 @@ void check_observations(const EverydayScene& scene, Differences& found) {
   Observations seen(*scene.model, scene.effects, names_of(scene));
   std::vector<double> row(static_cast<std::size_t>(seen.width()));
   Simulation moved = simulation_of(scene, scene.options.step);
-  Batch batch(scene.model, 3, scene.options, scene.effects, {.threads = 1});
+  // bodies that touch each other are stepped one simulation at a time
+  std::optional<Batch> batch;
+  if (!scene.effects.contact) batch.emplace(scene.model, 3, scene.options, scene.effects, BatchOptions{.threads = 1});
   std::vector<double> rows(3 * row.size());
   for (const bool at_start : {true, false}) {
     if (!at_start && !moved.run(scene.horizon).ok()) return;  // is another check's
@@ -130,9 +132,10 @@ void check_observations(const EverydayScene& scene, Differences& found) {
     Simulation alone(scene.model, scene.options, scene.effects);
     alone.set_positions(moved.positions());
     alone.set_velocities(moved.velocities());
-    batch.reset(1, moved.positions(), moved.velocities());
     seen.observe(alone, row);
-    batch.observe(seen, rows);
+    if (!batch) continue;
+    batch->reset(1, moved.positions(), moved.velocities());
+    batch->observe(seen, rows);
     const std::span<const double> second = std::span(rows).subspan(row.size(), row.size());
     for (const Observed& entry : seen.layout()) {
       expect(entry, part(entry, second), part(entry, row), "a batch", "a simulation's", found);

@@ -737,7 +737,9 @@ class Maker {
 
 }  // namespace
 
-EverydayScene everyday_scene(std::uint64_t seed, std::uint64_t number) { return Maker(seed, number).make(); }
+EverydayScene everyday_scene(std::uint64_t seed, std::uint64_t number) {
+  return touches(number) ? touching_scene(seed, number) : Maker(seed, number).make();
+}
 
 std::string EverydayScene::text() const {
   std::string acts;
@@ -757,6 +759,7 @@ std::string EverydayScene::text() const {
   name(!effects.motions.empty(), "motion");
   name(!effects.drag.empty(), "drag");
   name(effects.ground.has_value(), rough ? "rough ground" : "ground");
+  name(effects.contact.has_value(), "contact");
   const bool floats = model->tree.shape.slots > 1 && model->tree.kind(1) == JointKind::free;
   return fmt::format("{}{}, {} {}{}, {} base, h = {:.3g} ms, {} steps; {}", stiff ? "stiff " : "", kind, model->tree.bodies(),
                      model->tree.bodies() == 1 ? "body" : "bodies", model->mimics.empty() ? "" : ", ties", floats ? "floating" : "fixed",

@@ -41,4 +41,8 @@ struct EverydayScene {
 
 EverydayScene everyday_scene(std::uint64_t seed, std::uint64_t number);
 
+/// Whether the scene of this number is one of bodies that touch each other, which touching.cpp makes: one in six.
+bool touches(std::uint64_t number);
+EverydayScene touching_scene(std::uint64_t seed, std::uint64_t number);
+
 }  // namespace linden

@@ -79,6 +79,7 @@ Walk walk(const EverydayScene& scene, std::int64_t steps) {
 PlainScene plain_of(const EverydayScene& scene, const VectorXd& q, const VectorXd& v, double time) {
   PlainScene plain(*scene.model, scene.effects, scene.options.gravity);
   plain.time = time;
+  plain.ease_contact(scene.options.step);
   plain.start(q, v);
   return plain;
 }

@@ -59,15 +59,15 @@ inline PlainConvex plain_convex(const ConvexShape& shape, const Pose& pose) {
 /// -h(n): how far the shapes are apart along n, from a to b.
 inline double distance_along(const PlainConvex& a, const PlainConvex& b, const Eigen::Vector3d& n) { return -a.reach(n) - b.reach(-n); }
 
-/// The largest value of a function of a unit direction, to some 1e-9 of how it varies where it has no narrow peaks.
+struct SearchedDirection {
+  double value;
+  Eigen::Vector3d n;
+};
+
+/// A function of a unit direction all around, its largest values first.
 template <class Function>
-double largest_over_directions(const Function& value) {
-  constexpr int count = 1500, kept = 4;
-  struct Direction {
-    double value;
-    Eigen::Vector3d n;
-  };
-  std::vector<Direction> all;
+std::vector<SearchedDirection> directions_around(const Function& value, int count) {
+  std::vector<SearchedDirection> all;
   for (int k = 0; k < count; ++k) {
     // a spiral from pole to pole
     const double z = 1 - (2.0 * k + 1) / count, turn = k * 2.399963229728653;
@@ -75,26 +75,38 @@ double largest_over_directions(const Function& value) {
     const Eigen::Vector3d n(rho * std::cos(turn), rho * std::sin(turn), z);
     all.push_back({value(n), n});
   }
-  std::partial_sort(all.begin(), all.begin() + kept, all.end(), [](const Direction& x, const Direction& y) { return x.value > y.value; });
-  double largest = -1e300;
-  for (int k = 0; k < kept; ++k) {
-    Direction best = all[static_cast<std::size_t>(k)];
-    double phase = 0;
-    int in_vain = 0;  // along a ridge few directions lead up: several sets are tried before a shorter step
-    for (double step = 0.05; step > 1e-9;) {
-      const Eigen::Vector3d s = best.n.unitOrthogonal(), t = best.n.cross(s);
-      Direction better = best;
-      for (int j = 0; j < 8; ++j) {
-        const double turn = phase + j * M_PI / 4;
-        const Eigen::Vector3d n = (best.n + step * (std::cos(turn) * s + std::sin(turn) * t)).normalized();
-        if (const double v = value(n); v > better.value) better = {v, n};
-      }
-      phase += 0.1;
-      if (better.value > best.value) best = better, in_vain = 0;
-      else if (++in_vain == 6) step *= 0.6, in_vain = 0;
+  constexpr int kept = 4;
+  std::partial_sort(all.begin(), all.begin() + kept, all.end(),
+                    [](const SearchedDirection& x, const SearchedDirection& y) { return x.value > y.value; });
+  return all;
+}
+
+/// From there up, by turns of `step` at first, until none leads higher.
+template <class Function>
+SearchedDirection climbed(const Function& value, SearchedDirection best, double step) {
+  double phase = 0;
+  int in_vain = 0;  // along a ridge few directions lead up: several sets are tried before a shorter step
+  while (step > 1e-9) {
+    const Eigen::Vector3d s = best.n.unitOrthogonal(), t = best.n.cross(s);
+    SearchedDirection better = best;
+    for (int j = 0; j < 8; ++j) {
+      const double turn = phase + j * M_PI / 4;
+      const Eigen::Vector3d n = (best.n + step * (std::cos(turn) * s + std::sin(turn) * t)).normalized();
+      if (const double v = value(n); v > better.value) better = {v, n};
     }
-    largest = std::max(largest, best.value);
+    phase += 0.1;
+    if (better.value > best.value) best = better, in_vain = 0;
+    else if (++in_vain == 6) step *= 0.6, in_vain = 0;
   }
+  return best;
+}
+
+/// The largest value of a function of a unit direction, to some 1e-9 of how it varies where it has no narrow peaks.
+template <class Function>
+double largest_over_directions(const Function& value) {
+  const std::vector<SearchedDirection> all = directions_around(value, 1500);
+  double largest = -1e300;
+  for (std::size_t k = 0; k < 4; ++k) largest = std::max(largest, climbed(value, all[k], 0.05).value);
   return largest;
 }
 

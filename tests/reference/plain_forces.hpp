@@ -12,6 +12,9 @@
 //   tangents    J across, two rows        goal 0                      |(lambda)| <= friction x lambda of the normal
 //   servo       J one joint               goal pull at rest / g       |lambda| <= max dt     compliance 1 / (g dt), g = c + k dt
 //
+// Bodies touch each other (plain_touch.hpp) as one touches the ground, g = k (eases + dt): a step of implicit Euler's method takes from a spring what
+// a damper of k times that step does, and what strikes within a step stops.
+//
 // lambda: impulse of a step of length dt [N m s, N s]. A servo of unlimited force is a force.
 #pragma once
 
@@ -19,10 +22,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "layout/effects.hpp"
 #include "tests/reference/plain_motion.hpp"
+#include "tests/reference/plain_touch.hpp"
 
 namespace linden::reference {
 
@@ -64,7 +69,9 @@ struct PlainContact {
 class PlainForces {
  public:
   PlainForces(const PlainTree& tree, const Effects& effects, const std::array<double, 3>& gravity)
-      : tree_(&tree), effects_(&effects), gravity_(vector_of(gravity)), position_(position_rows(tree)) {}
+      : tree_(&tree), effects_(&effects), gravity_(vector_of(gravity)), position_(position_rows(tree)) {
+    if (effects.contact) touching_.emplace(*effects.contact);
+  }
 
   Index position_row(Index row) const { return position_[static_cast<std::size_t>(row)]; }
   double position(const VectorXd& q, Index row) const { return q[position_[static_cast<std::size_t>(row)]]; }
@@ -164,8 +171,18 @@ class PlainForces {
     return side == 0 ? at - limit.lower : limit.upper - at;
   }
 
+  /// Where bodies touch each other, or may within dt. directions: of each pair, from one time to the next.
+  std::vector<PlainTouch> touches(const std::vector<BodyMotion>& motions, double dt, std::vector<Vector3d>& directions) const {
+    if (!touching_) return {};
+    constexpr double kNear = 2e-3, kArm = 0.3;  // [m]
+    double fast = 0;
+    for (const BodyMotion& motion : motions) fast = std::max(fast, motion.velocity.norm() + kArm * motion.w.norm());
+    return touching_->places(motions, kNear + 2 * dt * fast, directions);
+  }
+
   /// Whether anything that is sudden may act at q and v.
-  bool sudden(const VectorXd& q, const VectorXd& v, const std::vector<BodyMotion>& motions) const {
+  bool sudden(const VectorXd& q, const VectorXd& v, const std::vector<BodyMotion>& motions, const std::vector<PlainTouch>& touches) const {
+    if (std::ranges::any_of(touches, [](const PlainTouch& touch) { return touch.gap <= 0; })) return true;
     for (const JointFriction& friction : effects_->friction) {
       if (friction.force > 0) return true;
     }
@@ -175,9 +192,10 @@ class PlainForces {
     return std::ranges::any_of(contacts(motions), [](const PlainContact& contact) { return contact.gap <= 0; });
   }
 
-  /// Rows of a step of length dt that would go on with the velocities `free` if nothing sudden acted.
+  /// Rows of a step of length dt that would go on with the velocities `free` if nothing sudden acted. eases: of bodies that touch each other, the
+  /// damper beside the spring over its stiffness [s].
   std::vector<PlainRow> rows(const VectorXd& q, const VectorXd& v, const VectorXd& free, const std::vector<BodyMotion>& motions,
-                             double time, double dt) const {
+                             const std::vector<PlainTouch>& touches, double eases, double time, double dt) const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     std::vector<PlainRow> rows;
     const auto unit = [&](Index row, double sign) {
@@ -219,6 +237,17 @@ class PlainForces {
         rows.push_back({RowKind::tangent, across.transpose() * J, 0, 0, 0, 0, ground.friction});
       }
     }
+    for (const PlainTouch& touch : touches) {
+      const Rows3 J = motions[static_cast<std::size_t>(touch.slot_b)].rows_at(touch.place) - motions[static_cast<std::size_t>(touch.slot_a)].rows_at(touch.place);
+      const Eigen::RowVectorXd parts = touch.normal.transpose() * J;
+      if (touch.gap + dt * std::min(parts.dot(free), parts.dot(v)) > 0) continue;
+      const double stiffness = effects_->contact->stiffness, g = stiffness * ((touch.gap <= 0 ? eases : 0) + dt);
+      rows.push_back({RowKind::normal, parts, 0, kInfinity, -stiffness * touch.gap / g, 1 / (g * dt)});
+      const Vector3d x = touch.normal.unitOrthogonal(), y = touch.normal.cross(x);
+      for (const Vector3d& across : {x, y}) {
+        rows.push_back({RowKind::tangent, across.transpose() * J, 0, 0, 0, 0, effects_->contact->friction});
+      }
+    }
     return rows;
   }
 
@@ -235,6 +264,7 @@ class PlainForces {
   const Effects* effects_;
   Vector3d gravity_;
   std::vector<Index> position_;
+  std::optional<PlainTouching> touching_;
 };
 
 }  // namespace linden::reference

@@ -37,6 +37,9 @@ class PlainScene {
 
   const PlainTree& tree() const { return fixed_->tree; }
 
+  /// Where bodies touch each other: of their stiffness the damper that stands for steps of this length [s]; 0 at first.
+  void ease_contact(double step) { eases_ = step; }
+
   /// Followers follow.
   void start(const VectorXd& positions, const VectorXd& velocities) {
     q = positions;
@@ -118,7 +121,7 @@ class PlainScene {
     return stiffest;
   }
 
-  /// Kinetic energy and potential of gravity, springs and ground [J].
+  /// Kinetic energy and potential of gravity, springs, ground and contact [J].
   double energy() const {
     double sum = 0.5 * v.dot(mass_matrix() * v);
     const std::vector<BodyMotion> motions = body_motions(tree(), q, v);
@@ -144,6 +147,7 @@ class PlainScene {
     for (std::size_t row = 0; row < fixed_->springs.laws().size(); ++row) {
       sum += half_square(fixed_->springs.laws()[row].stiffness, gaps[static_cast<Eigen::Index>(row)]);
     }
+    for (const PlainTouch& touch : touches(motions, 0)) sum += half_square(fixed_->effects.contact->stiffness, std::min(touch.gap, 0.0));
     for (const PlainContact& contact : fixed_->forces.contacts(motions)) {
       sum += half_square(fixed_->effects.ground->stiffness, std::min(contact.gap, 0.0));
     }
@@ -291,10 +295,15 @@ class PlainScene {
     return at;
   }
 
+  std::vector<PlainTouch> touches(const std::vector<BodyMotion>& motions, double dt) const { return fixed_->forces.touches(motions, dt, directions_); }
+  bool sudden_at(const VectorXd& at, const VectorXd& rate) const {
+    const std::vector<BodyMotion> motions = body_motions(tree(), at, rate);
+    return fixed_->forces.sudden(at, rate, motions, touches(motions, 0));
+  }
+
   void step(double t, double dt) {
     const Within within{t, t + dt};
-    const std::vector<BodyMotion> motions = body_motions(tree(), q, v);
-    if (!fixed_->forces.sudden(q, v, motions)) {
+    if (!sudden_at(q, v)) {
       // order 4
       VectorXd dq[4], dv[4];
       for (int stage = 0; stage < 4; ++stage) {
@@ -306,7 +315,7 @@ class PlainScene {
       }
       const VectorXd ahead = unit_quaternions(q + dt / 6 * (dq[0] + 2 * dq[1] + 2 * dq[2] + dq[3]));
       const VectorXd rate = v + dt / 6 * (dv[0] + 2 * dv[1] + 2 * dv[2] + dv[3]);
-      if (!fixed_->forces.sudden(ahead, rate, body_motions(tree(), ahead, rate))) {
+      if (!sudden_at(ahead, rate)) {
         q = ahead;
         v = rate;
         close_gaps();
@@ -345,7 +354,7 @@ class PlainScene {
     };
     VectorXd after = v + taken_along + responses_to(dt * force - M * taken_along);
     if (!fixed_->couplings.empty()) close(after);
-    const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, t, dt);
+    const std::vector<PlainRow> rows = fixed_->forces.rows(q, v, after, motions, touches(motions, dt), eases_, t, dt);
     if (!rows.empty()) {
       MatrixXd W(static_cast<Eigen::Index>(rows.size()), tree().velocities);
       for (std::size_t r = 0; r < rows.size(); ++r) W.row(static_cast<Eigen::Index>(r)) = rows[r].J;
@@ -421,6 +430,8 @@ class PlainScene {
   }
 
   std::shared_ptr<const Fixed> fixed_;
+  double eases_ = 0;
+  mutable std::vector<Vector3d> directions_;  // of pairs that touch, as they were looked for last
 
  public:
   VectorXd q, v;     // [nq], [nv]
