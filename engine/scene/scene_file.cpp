@@ -40,7 +40,7 @@ const std::vector<std::string> kYesNo{"true", "false"};
 const std::vector<std::string> kStarts{"checked", "as given"};
 /// Of a model that needs contact.
 constexpr const char* kGeneratedScene = R"(duration: 5
-effects: {gravity: [0, 0, -9.81], contact: {stiffness: 1e8, friction: 0.6}}
+effects: {gravity: [0, 0, -9.81], contact: {friction: 0.6}}
 )";
 constexpr const char* kAModel = "a URDF file, or a generated model such as chain:3";
 

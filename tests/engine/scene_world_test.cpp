@@ -236,10 +236,9 @@ TEST_CASE("the crate of table.yaml comes to lie on the table, and is stopped by 
   CHECK(stopped[2] == Approx(1 + 0.4).margin(1e-5));
   CHECK(stopped[1] > post - 1e-5);
   std::vector<std::string> notes;
-  const double stiffness = scene.effects.contact->materials[0].stiffness, friction = scene.effects.contact->materials[0].friction;
+  const std::vector<ContactMaterial> materials = scene.effects.contact->materials;
   scene.effects.contact = pair_contact_of(scene.model, notes, {{"crate", "world/post"}});
-  scene.effects.contact->materials[0].stiffness = stiffness;
-  scene.effects.contact->materials[0].friction = friction;
+  scene.effects.contact->materials = materials;
   CHECK(ends_at(scene)[1] < post - 0.01);
 }
 

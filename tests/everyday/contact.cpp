@@ -35,7 +35,7 @@ class Touched {
   }
 
   void look(std::int64_t step, Simulation& simulation) {
-    const double mu = std::max(scene_.effects.contact->friction, scene_.effects.ground ? scene_.effects.ground->friction : 0.0);
+    const double mu = std::max(scene_.effects.contact->materials[0].friction, scene_.effects.ground ? scene_.effects.ground->friction : 0.0);
     const std::vector<ContactPoint> points = simulation.contact_points();
     double largest = 0;
     for (const ContactPoint& point : points) largest = std::max(largest, vector_of(point.force).norm());
@@ -78,7 +78,7 @@ class Touched {
     for (const auto& [slot, mass] : masses()) heaviest += mass;
     for (const auto& motion : reference::body_motions(tree, q, linden::vector_of(simulation.velocities()))) fastest = std::max(fastest, motion.velocity.norm() + 0.3 * motion.w.norm());
     fastest_ = std::max(fastest_, fastest);
-    const double k = scene_.effects.contact->stiffness;
+    const double k = scene_.effects.contact->materials[0].stiffness;
     const double allowed = 2 * fastest_ * (scene_.options.step + std::sqrt(heaviest / k)) + 20 * heaviest * 9.81 / k + 1e-6;
     if (-deepest > allowed) add("deep", step, fmt::format("bodies are {:.3g} m within each other; expected {:.3g} at most", -deepest, allowed));
   }

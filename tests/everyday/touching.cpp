@@ -336,8 +336,8 @@ class TouchingMaker {
     const Model& model = *scene_.model;
     std::vector<std::string> notes;
     PairContact contact = pair_contact_of(model, notes);
-    contact.stiffness = stiffness_;
-    contact.friction = friction_;
+    contact.materials[0].stiffness = stiffness_;
+    contact.materials[0].friction = friction_;
     InitialState& start = scene_.start;
     start.positions = model.neutral();
     start.velocities.assign(static_cast<std::size_t>(model.tree.shape.velocities), 0.0);

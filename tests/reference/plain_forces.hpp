@@ -241,11 +241,11 @@ class PlainForces {
       const Rows3 J = motions[static_cast<std::size_t>(touch.slot_b)].rows_at(touch.place) - motions[static_cast<std::size_t>(touch.slot_a)].rows_at(touch.place);
       const Eigen::RowVectorXd parts = touch.normal.transpose() * J;
       if (touch.gap + dt * std::min(parts.dot(free), parts.dot(v)) > 0) continue;
-      const double stiffness = effects_->contact->stiffness, g = stiffness * ((touch.gap <= 0 ? eases : 0) + dt);
+      const double stiffness = effects_->contact->materials[0].stiffness, g = stiffness * ((touch.gap <= 0 ? eases : 0) + dt);
       rows.push_back({RowKind::normal, parts, 0, kInfinity, -stiffness * touch.gap / g, 1 / (g * dt)});
       const Vector3d x = touch.normal.unitOrthogonal(), y = touch.normal.cross(x);
       for (const Vector3d& across : {x, y}) {
-        rows.push_back({RowKind::tangent, across.transpose() * J, 0, 0, 0, 0, effects_->contact->friction});
+        rows.push_back({RowKind::tangent, across.transpose() * J, 0, 0, 0, 0, effects_->contact->materials[0].friction});
       }
     }
     return rows;

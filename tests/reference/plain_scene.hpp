@@ -147,7 +147,7 @@ class PlainScene {
     for (std::size_t row = 0; row < fixed_->springs.laws().size(); ++row) {
       sum += half_square(fixed_->springs.laws()[row].stiffness, gaps[static_cast<Eigen::Index>(row)]);
     }
-    for (const PlainTouch& touch : touches(motions, 0)) sum += half_square(fixed_->effects.contact->stiffness, std::min(touch.gap, 0.0));
+    for (const PlainTouch& touch : touches(motions, 0)) sum += half_square(fixed_->effects.contact->materials[0].stiffness, std::min(touch.gap, 0.0));
     for (const PlainContact& contact : fixed_->forces.contacts(motions)) {
       sum += half_square(fixed_->effects.ground->stiffness, std::min(contact.gap, 0.0));
     }
