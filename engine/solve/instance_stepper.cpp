@@ -48,11 +48,11 @@ void InstanceStepper::refresh() {
   stepper_->refresh(state_);
 }
 
-StepReport InstanceStepper::step(double time) {
+StepReport InstanceStepper::step(double time, int guessed) {
   refresh();
   StepReport whole;
   for (const double stage : composition(options_.order)) {
-    int history = 0;
+    int history = guessed;
     whole.add(stepper_->step(state_, history, time, stage * options_.step, Then::stop));
     if (!whole.ok()) break;
   }

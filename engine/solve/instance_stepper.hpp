@@ -34,8 +34,8 @@ class InstanceStepper {
   std::span<double> contact_memory() { return stepper_->contact_memory(); }
 
   /// One step of the state, from `time` on; after one that failed the state is no more what it was. The latest row of state().history and
-  /// state().last_step say what is known of the step before.
-  StepReport step(double time);
+  /// state().last_step say what is known of the step before; the first guess goes by `guessed` of them, 0 or 1.
+  StepReport step(double time, int guessed);
   /// Closes the couplings of a start that leaves them nearly closed; returns how far open they are.
   Assembly close_nearly_closed();
   /// p = M(q) v.

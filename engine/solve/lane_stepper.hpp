@@ -143,7 +143,7 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
       std::uint32_t* const past = block.past + stage * static_cast<std::size_t>(tree_.shape.velocities * kWords);
       const Lanes free = together & ~near;
       const Lanes done = free != 0 ? solve(block, free, past) : 0;
-      frozen |= step_lost(block, together & ~done);
+      frozen |= step_lost(block, together & ~done, near);
       sweeps_.end(block, done);
       if (done != 0) remember_displacement(block, done, past);
       together = done;
@@ -177,8 +177,9 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     std::ranges::copy(sweeps_.p().flat(), start_p_.flat().begin());
   }
 
-  /// Takes the step in these lanes, each alone. Returns those that are frozen.
-  Lanes step_lost(const Block<Real>& block, Lanes lost) {
+  /// Takes the step in these lanes, each alone; near: those that were not tried together, so nothing speaks against their first guess. Returns
+  /// those that are frozen.
+  Lanes step_lost(const Block<Real>& block, Lanes lost, Lanes near) {
     Lanes frozen = 0;
     if (lost != 0 && stages_.size() > 1) {
       const auto back = [&](const Field<Pack>& from, Field<Pack>& to) {
@@ -189,7 +190,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     }
     for (Lanes left = lost; left != 0; left &= left - 1) {
       const int l = std::countr_zero(left);
-      if (!step_alone(block, l)) frozen |= 1u << l;
+      const bool guessed = ((near & known(block)) >> l & 1u) != 0;
+      if (!step_alone(block, l, guessed ? 1 : 0)) frozen |= 1u << l;
     }
     return frozen;
   }
@@ -267,10 +269,10 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
   }
 
   /// One instance with everything a Simulation can do. False where that fails too: it is frozen then.
-  [[gnu::noinline]] bool step_alone(const Block<Real>& block, int l) {
+  [[gnu::noinline]] bool step_alone(const Block<Real>& block, int l, int guessed) {
     State<double>& state = alone_.state();
     take_out(block, l);
-    const StepReport report = alone_.step(static_cast<double>(block.instances[l].steps) * options_.step);
+    const StepReport report = alone_.step(static_cast<double>(block.instances[l].steps) * options_.step, guessed);
     InstanceRecord& instance = block.instances[l];
     instance.evaluations += report.evaluations;
     if (!report.ok()) {

@@ -257,8 +257,8 @@ double core_reach(const ConvexShape& shape) {
   switch (shape.kind) {
     case ConvexKind::point: return 0;
     case ConvexKind::segment: return half[2];
-    case ConvexKind::box: return std::hypot(half[0], half[1], half[2]);
-    case ConvexKind::cylinder: return std::hypot(half[0], half[2]);
+    case ConvexKind::box: return std::sqrt(half[0] * half[0] + half[1] * half[1] + half[2] * half[2]);  // no hypot: it is asked of every pair at every step
+    case ConvexKind::cylinder: return std::sqrt(half[0] * half[0] + half[2] * half[2]);
     case ConvexKind::ellipsoid: return std::max({half[0], half[1], half[2]});
     case ConvexKind::hull: return shape.hull->reach;
   }
