@@ -157,7 +157,7 @@ class PlainTouching {
     }
     std::vector<PlainTouch> result;
     for (std::size_t k = 0; k < contact_.pairs.size(); ++k) {
-      const auto& [a, b] = contact_.pairs[k];
+      const std::size_t a = contact_.pairs[k].first, b = contact_.pairs[k].second;
       if ((middles[b] - middles[a]).norm() > reach_[a] + reach_[b] + near) continue;
       const auto apart = [&](const Vector3d& n) { return distance_along(shapes[a], shapes[b], n); };
       directions[k] = direction(apart, directions[k]);
