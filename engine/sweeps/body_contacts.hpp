@@ -58,6 +58,9 @@ S gap_looked_at(double reach_a, double reach_b, const S& moved_a, const S& moved
 inline constexpr std::size_t kLasted = 1, kRememberedMiddle = 2, kNumbersOfTouch = 8;
 inline std::size_t remembered_touch(std::size_t shapes, std::size_t rows) { return kRememberedMiddle + 3 * shapes + rows; }
 
+/// Of the largest of a step, a load that is none: what rounding leaves where places let go of each other.
+inline constexpr double kNoLoad = 1e-14;
+
 class BodyContacts {
  public:
   /// One place where two shapes are near each other.
@@ -92,8 +95,12 @@ class BodyContacts {
     forces_.resize(touches_.size());
     lasting_.resize(touches_.size());
     memory_[kLasted] = 0;
+    double largest = 0;
+    for (std::size_t k = 0; k < touches_.size(); ++k) largest = std::max(largest, solved.impulse_of(k)[2]);
     for (std::size_t k = 0; k < touches_.size(); ++k) {
-      const std::array<double, 3> impulse = solved.impulse_of(k), opens = solved.opens(k, before, now);
+      std::array<double, 3> impulse = solved.impulse_of(k);
+      if (impulse[2] <= kNoLoad * largest) impulse = {0, 0, 0};
+      const std::array<double, 3> opens = solved.opens(k, before, now);
       double given = 0;
       for (std::size_t j = 0; j < 3; ++j) {
         forces_[k][j] = impulse[j] / (h * h);
