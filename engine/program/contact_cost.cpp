@@ -56,7 +56,7 @@ ContactCost contact_cost(const Scene& scene) {
   for (TouchingSteps& group : cost.steps) group.seconds /= static_cast<double>(group.count);
 
   const Kinematics now(simulation);
-  BodyContacts contacts(*scene.effects.contact);
+  BodyContacts contacts(*scene.effects.contact, scene.model);
   cost.find = std::numeric_limits<double>::infinity();
   for (int k = 0; k < kFinds; ++k) {
     const Clock::time_point begin = Clock::now();
