@@ -390,7 +390,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
   fold_mimics(sweeps_.mimics(), state.p);
   if (has_stages_) std::ranges::copy(work_.delta.flat(), before_.flat().begin());
   if constexpr (kEffects) {
-    sweeps_.end_reading(before_, known);
+    sweeps_.end_reading(h, before_, known);
     if (strike(state, h, true, report)) history = 1;
   }
 }

@@ -215,6 +215,21 @@ Vec3<double> BodyContacts::force_on_b(std::size_t touch) const {
   return force[0] * vector(&d[0]) + force[1] * vector(&d[3]) + force[2] * vector(&d[6]);
 }
 
+void BodyContacts::push_lasting(double h, const Field<double, 12>& pose, Field<double, 6>& impulse) const {
+  for (std::size_t k = 0; k < touches_.size(); ++k) {
+    const std::array<double, 9>& d = touches_[k].across;
+    const Force& last = lasting_[k];
+    const Vec3<double> on_b = (0.5 / h) * (last[0] * vector(&d[0]) + last[1] * vector(&d[3]) + last[2] * vector(&d[6]));
+    const Vec3<double> place = vector(touches_[k].place.data());
+    for (const auto& [slot, force] : {std::pair(couplings_[k].slot_a, -1.0 * on_b), std::pair(couplings_[k].slot_b, on_b)}) {
+      if (slot == 0) continue;
+      const auto body = load<Placement, double>(pose, slot);
+      const Vec3<double> own = transpose_times(body.R, force), arm = transpose_times(body.R, place - body.p);
+      store(impulse, slot, load<Wrench, double>(impulse, slot) + Wrench<double>{cross(arm, own), own});
+    }
+  }
+}
+
 std::vector<TouchImpulse> BodyContacts::impulses(double h) const {
   std::vector<TouchImpulse> pushing;
   for (std::size_t k = 0; k < touches_.size(); ++k) {

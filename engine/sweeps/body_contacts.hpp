@@ -118,10 +118,12 @@ class BodyContacts {
     if (stored() != stored_before) book(0, stored_before - stored());
     remember();
   }
-  /// Whether something pushed in the step solved last as in that before: velocities are read with half of it (engine/VELOCITY.md). Of each touch,
-  /// along its rows, times h, until the next step begins; and what becomes of it, along each velocity [N m s, N s], which is remembered.
+  /// Whether something pushed in the step solved last as in that before: velocities are read with half of it (engine/VELOCITY.md).
   bool lasted() const { return memory_[kLasted] != 0; }
-  std::span<const Force> lasting() const { return lasting_; }
+  /// Until the next step begins, of a step of h: impulse += half of it on each body, with bodies at these poses: moment about its origin, force; in
+  /// its frame [N m s, N s].
+  void push_lasting(double h, const Field<double, 12>& pose, Field<double, 6>& impulse) const;
+  /// What becomes of it along each velocity [N m s, N s], which is remembered.
   std::span<double> lasting_push() { return std::span(memory_).subspan(remembered_touch(contact_.shapes.size(), 0), rows_); }
   /// A blow has changed all velocities.
   void drop_lasting() { memory_[kLasted] = 0; }

@@ -277,14 +277,7 @@ class CouplingSweeps {
     }
     return mean;
   }
-  /// to += share of these along the rows of contacts, with bodies where they are; of what they pushed.
-  void push_contacts(double share, std::span<const std::array<double, 3>> impulses, Field<S>& to) {
-    std::ranges::fill(pull_, S(0.0));
-    for (std::size_t contact = 0; contact < impulses.size(); ++contact) {
-      for (std::size_t j = 0; j < 3; ++j) pull_[first_of(contact) + j] = as<S>(share * impulses[contact][j]);
-    }
-    rows_.push(pull_, rows_.at_begin(), to, plus);
-  }
+  /// to += share of what contacts pushed, with bodies where they are.
   void add_contacts(double share, Field<S>& to) {
     std::ranges::fill(pull_, S(0.0));
     for (std::size_t row = rows_.paths().lasting_rows(); row < rows(); ++row) pull_[row] = as<S>(share) * (lambda_[row] + increment_[row]);

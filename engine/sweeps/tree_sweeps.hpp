@@ -36,7 +36,9 @@
 #include "engine/sweeps/down_and_up.hpp"
 #include "engine/sweeps/strategy.hpp"
 #include "kernels/tree/articulated.hpp"
+#include "kernels/tree/impulse_up.hpp"
 #include "kernels/tree/mimic.hpp"
+#include "kernels/tree/world_placement_down.hpp"
 #include "layout/workspace.hpp"
 
 namespace linden {
@@ -168,12 +170,7 @@ class TreeSweeps {
   /// the step before; book(slot, what they took [J]).
   template <class Book>
   void end_contacts(double h, const Field<double>& before, const Book& book) {
-    if (!contacts_) return;
-    contacts_->keep(h, *couplings_, before, work_.delta, book);
-    if (!contacts_->lasted()) return;
-    std::ranges::fill(work_.momentum.flat(), 0.0);
-    couplings_->push_contacts(0.5 / h, contacts_->lasting(), work_.momentum);
-    std::ranges::copy(work_.momentum.flat(), contacts_->lasting_push().begin());
+    if (contacts_) contacts_->keep(h, *couplings_, before, work_.delta, book);
   }
   /// Then, while bodies are where they were: what contacts pushed.
   template <class Account>
@@ -211,8 +208,16 @@ class TreeSweeps {
   /// with LINDEN_POISON.
   void poison_scratch();
   /// At the end of a step with effects: what velocities are read from beside p.
-  void end_reading(const Field<double>& before, bool known) {
+  void end_reading(double h, const Field<double>& before, bool known) {
     if constexpr (kEffects) {
+      if (contacts_ && contacts_->lasted()) {
+        // where bodies are now: at one point of space with both of a pair, so that momentum is told as it is kept
+        world_placement_down(model_.tree, work_.placement, pose_);
+        std::ranges::fill(work_.impulse.flat(), 0.0);
+        contacts_->push_lasting(h, pose_, work_.impulse);
+        impulse_up(model_.tree, *constants_, work_.placement, work_.impulse, work_.momentum);
+        std::ranges::copy(work_.momentum.flat(), contacts_->lasting_push().begin());
+      }
       if (contacts_) effects_.add_to_reading(contacts_->lasted() ? std::span<const double>(contacts_->lasting_push()) : std::span<const double>());
       effects_.end_reading(*constants_, work_.placement, true, work_.delta, before, known, work_.impulse, work_.increment);
     }

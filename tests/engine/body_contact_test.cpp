@@ -112,13 +112,15 @@ double energy_between(const std::vector<double>& before, const Simulation& simul
   return sum;
 }
 
-/// Sums of all rises of energy in a run, as it is told and between states; how far the account of energy strays; how much is lost.
+/// Sums of all rises of energy in a run, as it is told and between states; how far the account of energy strays; how much is lost; by how much
+/// momentum that is told changes.
 struct Account {
-  double rises = 0, between = 0, strays = 0, fell = 0;
+  double rises = 0, between = 0, strays = 0, fell = 0, told = 0;
 };
 
 Account accounted(Simulation& simulation, double time) {
   const double start = simulation.energy().total();
+  const Momentum first = simulation.momentum();
   double last = start, last_between = 1e9;
   Account account;
   for (int k = 0; k < steps_of(time, simulation); ++k) {
@@ -126,6 +128,7 @@ Account accounted(Simulation& simulation, double time) {
     const StepReport report = simulation.step();
     if (!report.ok()) FAIL(fmt::format("step {}: {}", k, simulation.describe(report)));
     const double now = simulation.energy().total();
+    account.told = std::max({account.told, distance(simulation.momentum().linear, first.linear), distance(simulation.momentum().angular, first.angular)});
     account.rises += std::max(0.0, now - last);
     account.strays = std::max(account.strays, std::abs(now + simulation.effect_work().taken() - start));
     last = now;
@@ -340,6 +343,7 @@ TEST_CASE("what collides in free flight keeps its momentum", "[body_contact]") {
   CHECK(distance(before.linear, after.linear) < 1e-13);
   CHECK(distance(before.angular, after.angular) < 1e-13);
   CHECK(simulation.energy().total() < 0.8 * start);
+  CHECK(account.told < 1e-13);
   CHECK(account.rises < 1e-10);
   CHECK(account.strays < 1e-3);
 }
