@@ -42,7 +42,7 @@ namespace linden {
 inline constexpr double kRecoverySpeed = 1e-2;
 
 /// What comes together more slowly does not bounce [m/s]. Of what strikes faster a thousandth of the speed is at most lost beside its restitution.
-inline constexpr double kLeastRebound = 0.05, kRigid = 1e6;
+inline constexpr double kLeastRebound = 0.05, kRigid = 1e5;
 
 /// Of their size by which shapes may be apart to be looked at, whatever they do.
 inline constexpr double kNearBy = 0.02;
