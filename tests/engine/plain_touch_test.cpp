@@ -47,8 +47,8 @@ reference::PlainScene scene_of(const Model& model, double slope) {
   std::vector<std::string> notes;
   Effects effects;
   effects.contact = pair_contact_of(model, notes);
-  effects.contact->friction = kFriction;
-  effects.contact->stiffness = 1e8;
+  effects.contact->materials[0].friction = kFriction;
+  effects.contact->materials[0].stiffness = 1e8;
   reference::PlainScene scene(model, effects, {kGravity * std::sin(slope), 0, -kGravity * std::cos(slope)});
   scene.ease_contact(1e-3);
   return scene;
