@@ -13,7 +13,7 @@
 namespace linden {
 namespace {
 
-constexpr double kSeconds = 0.5;  // of steps
+constexpr double kContactSeconds = 0.5;  // of steps
 constexpr int kFinds = 20;
 
 using Clock = std::chrono::steady_clock;
@@ -42,7 +42,7 @@ ContactCost contact_cost(const Scene& scene) {
   ContactCost cost{.pairs = scene.effects.contact->pairs.size()};
   const auto steps = static_cast<std::int64_t>(std::ceil(scene.duration / scene.options.step));
   double taken = 0;
-  for (std::int64_t k = 0; k < steps && taken < kSeconds; ++k) {
+  for (std::int64_t k = 0; k < steps && taken < kContactSeconds; ++k) {
     const Clock::time_point begin = Clock::now();
     if (!simulation.step().ok()) break;
     const double seconds = seconds_since(begin);

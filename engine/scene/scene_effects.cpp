@@ -49,7 +49,7 @@ const std::vector<std::string> kDrag{"linear", "quadratic", "wind", "bodies"};
 const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
 const std::vector<std::string> kContact{"stiffness", "damping", "friction", "restitution", "between", "pairs", "except", "srdf"};
-const std::vector<std::string> kBetween{"links", "stiffness", "damping", "friction", "restitution"};
+const std::vector<std::string> kBetweenKeys{"links", "stiffness", "damping", "friction", "restitution"};
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
 /// By which a curve may round beyond a limit that one of its points lies on [rad, m].
@@ -374,7 +374,7 @@ class EffectsReader {
 
   /// Values of what touches between two links, or of all that touches one, over those of entries before.
   void read_between(const SceneValue& at, PairContact& contact) const {
-    at.entries_of(kBetween);
+    at.entries_of(kBetweenKeys);
     const auto links = at.find("links");
     if (!links) at.fail(at.path() + " names no links", "links: [link, link], or [link] for all that touches it", "add it");
     std::vector<std::string> names;

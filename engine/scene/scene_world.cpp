@@ -15,13 +15,13 @@ namespace linden {
 namespace {
 
 using Keys = std::vector<std::string>;
-const Keys kTypes{"box", "sphere", "cylinder", "capsule", "mesh"};
-const Keys kBox{"type", "name", "size", "position", "rotation", "quaternion"};
-const Keys kSphere{"type", "name", "radius", "position", "rotation", "quaternion"};
-const Keys kRound{"type", "name", "radius", "length", "position", "rotation", "quaternion"};
-const Keys kMesh{"type", "name", "file", "scale", "position", "rotation", "quaternion"};
-constexpr const char* kEdges = "[x, y, z] in m, edges above zero";
-constexpr const char* kScale = "[x, y, z], none of them zero";
+const Keys kWorldTypes{"box", "sphere", "cylinder", "capsule", "mesh"};
+const Keys kBoxKeys{"type", "name", "size", "position", "rotation", "quaternion"};
+const Keys kSphereKeys{"type", "name", "radius", "position", "rotation", "quaternion"};
+const Keys kRoundKeys{"type", "name", "radius", "length", "position", "rotation", "quaternion"};
+const Keys kMeshKeys{"type", "name", "file", "scale", "position", "rotation", "quaternion"};
+constexpr const char* kEdgesExpected = "[x, y, z] in m, edges above zero";
+constexpr const char* kScaleExpected = "[x, y, z], none of them zero";
 
 SceneValue required(const SceneValue& at, const std::string& type, std::string_view key, std::string_view expected) {
   if (const auto found = at.find(key)) return *found;
@@ -29,29 +29,29 @@ SceneValue required(const SceneValue& at, const std::string& type, std::string_v
 }
 
 CollisionShape box_of(const SceneValue& at) {
-  at.entries_of(kBox);
-  const SceneValue size = required(at, "box", "size", kEdges);
-  const std::array<double, 3> edges = size.vector(kEdges);
+  at.entries_of(kBoxKeys);
+  const SceneValue size = required(at, "box", "size", kEdgesExpected);
+  const std::array<double, 3> edges = size.vector(kEdgesExpected);
   for (const double edge : edges) {
-    if (!(edge > 0)) size.refuse(kEdges, "a plate is a thin box: write how thick it is");
+    if (!(edge > 0)) size.refuse(kEdgesExpected, "a plate is a thin box: write how thick it is");
   }
   return {ShapeKind::box, edges, ""};
 }
 
 CollisionShape sphere_of(const SceneValue& at) {
-  at.entries_of(kSphere);
+  at.entries_of(kSphereKeys);
   return {ShapeKind::sphere, {required(at, "sphere", "radius", "radius: in m").positive()}, ""};
 }
 
 CollisionShape round_of(const SceneValue& at, const std::string& type) {
-  at.entries_of(kRound);
+  at.entries_of(kRoundKeys);
   const double radius = required(at, type, "radius", "radius: in m").positive();
   const double length = required(at, type, "length", "length: in m, along z").positive();
   return {type == "capsule" ? ShapeKind::capsule : ShapeKind::cylinder, {radius, length}, ""};
 }
 
 CollisionShape mesh_of(const SceneValue& at, const std::string& folder) {
-  at.entries_of(kMesh);
+  at.entries_of(kMeshKeys);
   const SceneValue file = required(at, "mesh", "file", "file: of the mesh, found relative to the scene");
   std::error_code ignored;
   const std::string path = std::filesystem::absolute(std::filesystem::path(folder) / file.text("a mesh file"), ignored).lexically_normal().string();
@@ -61,9 +61,9 @@ CollisionShape mesh_of(const SceneValue& at, const std::string& folder) {
               "check the path");
   }
   if (const auto scale = at.find("scale")) {
-    shape.size = scale->vector(kScale);
+    shape.size = scale->vector(kScaleExpected);
     for (const double factor : shape.size) {
-      if (factor == 0) scale->refuse(kScale, "write 1 for what stays as it is");
+      if (factor == 0) scale->refuse(kScaleExpected, "write 1 for what stays as it is");
     }
   }
   return shape;
@@ -85,7 +85,7 @@ Model read_world(const SceneValue& at, Model model, const std::string& folder) {
     item.entries("a shape, {type: box, size: [x, y, z], position: [x, y, z]}");
     const auto which = item.find("type"), name = item.find("name");
     if (!which) item.fail(fmt::format("{} has no type", item.path()), "type: box, sphere, cylinder, capsule or mesh", "add it");
-    const std::string& type = which->choice(kTypes);
+    const std::string& type = which->choice(kWorldTypes);
     WorldShape shape{.name = name ? name->text("a name") : fmt::format("{}_{}", type, k + 1), .shape = shape_of(item, type, folder)};
     shape.pose = read_base(item).pose();
     model = item.located([&] { return with_world(std::move(model), {shape}); });

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <ranges>
 
 #include "kernels/collision/convex_pair.hpp"
 #include "kernels/effects/ground_contact.hpp"
@@ -17,7 +16,7 @@ namespace {
 constexpr std::size_t kMostOfShape = 32;
 
 /// Numbers of one.
-constexpr std::size_t kNumbers = kNumbersOfTouch, kForce = 3, kSpring = 6, kDepth = 7;
+constexpr std::size_t kNumbers = kNumbersOfTouch, kForceAt = 3, kSpringAt = 6, kDepthAt = 7;
 
 Vec3<double> vector(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
@@ -156,8 +155,13 @@ void BodyContacts::add(std::size_t pair, double margin, const Field<double, 12>&
 std::span<const double> BodyContacts::remembered_of_pair(std::size_t pair) const {
   const auto number = [&](std::size_t k) { return memory_[first_number() + kNumbers * k]; };
   const auto search = [&](double least) {
-    const auto places = std::views::iota(std::size_t(0), (memory_.size() - first_number()) / kNumbers);
-    return static_cast<std::size_t>(std::ranges::partition_point(places, [&](std::size_t k) { return number(k) != 0 && number(k) < least; }) - places.begin());
+    std::size_t low = 0, high = (memory_.size() - first_number()) / kNumbers;
+    while (low < high) {
+      const std::size_t middle = (low + high) / 2;
+      if (number(middle) != 0 && number(middle) < least) low = middle + 1;
+      else high = middle;
+    }
+    return low;
   };
   const auto name = static_cast<double>(pair + 1);
   const std::size_t begin = search(name), end = search(name + 1);
@@ -174,7 +178,7 @@ std::span<const double> BodyContacts::remembered(std::size_t touch) const {
 
 double BodyContacts::stored_of_last() const {
   double sum = 0;
-  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) sum += 0.25 * memory_[at + kSpring] * memory_[at + kDepth];
+  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) sum += 0.25 * memory_[at + kSpringAt] * memory_[at + kDepthAt];
   return sum;
 }
 
@@ -193,7 +197,7 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
   }
   const std::span<const double> of_pair = remembered_of_pair(at.pair);
   double borne = 0;  // the deepest of it
-  for (std::size_t one = 0; one < of_pair.size(); one += kNumbers) borne = std::max(borne, of_pair[one + kDepth]);
+  for (std::size_t one = 0; one < of_pair.size(); one += kNumbers) borne = std::max(borne, of_pair[one + kDepthAt]);
   const double gap = std::min(0.0, at.gap);
   step.spring_lift = std::max(0.0, -gap - borne - h * kRecoverySpeed);
   const double spring = step.law.stiffness, damper = h * material.damping;
@@ -205,7 +209,7 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
 std::array<double, 3> BodyContacts::guess_of(std::size_t touch, double h) const {
   const std::span<const double> last = remembered(touch);
   std::array<double, 3> guess{};
-  for (std::size_t j = 0; !last.empty() && j < 3; ++j) guess[j] = h * h * dot(vector(&touches_[touch].across[3 * j]), vector(&last[kForce]));
+  for (std::size_t j = 0; !last.empty() && j < 3; ++j) guess[j] = h * h * dot(vector(&touches_[touch].across[3 * j]), vector(&last[kForceAt]));
   return guess;
 }
 

@@ -416,10 +416,10 @@ bool starts_apart(const EverydayScene& scene) {
   const reference::PlainTree tree = reference::plain_tree(*scene.model);
   const auto vector_of = [](const std::vector<double>& numbers) { return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()))); };
   const auto motions = reference::body_motions(tree, vector_of(scene.start.positions), vector_of(scene.start.velocities));
-  constexpr double kRounding = 1e-8;  // [m]
+  constexpr double kTouchRounding = 1e-8;  // [m]
   std::vector<Vector3d> directions;
   const auto places = reference::PlainTouching(*scene.effects.contact).places(motions, 0, directions);
-  return std::ranges::none_of(places, [](const reference::PlainTouch& touch) { return touch.gap < -kRounding; });
+  return std::ranges::none_of(places, [](const reference::PlainTouch& touch) { return touch.gap < -kTouchRounding; });
 }
 
 }  // namespace
