@@ -35,7 +35,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <span>
 #include <type_traits>
@@ -179,7 +178,7 @@ class CouplingSweeps {
     const std::vector<S>& jacobian = of == Coupled::step ? rows_.at_end() : rows_.at_begin();
     ClosureFactors<S, Pack>& factors = factors_of(of);
     made_last_ = &factors;
-    if (closure < contact_solves_.size() && contact_solves_[closure]) contact_solves_[closure]->renew();
+    contact_solves_.renew(closure);
     for (const std::size_t k : closures()[closure].paths) {
       if (of == Coupled::step && has_history()) keep_rows(all()[k]);
     }
@@ -384,11 +383,8 @@ class CouplingSweeps {
   bool touches(std::size_t row) const { return row >= rows_.paths().lasting_rows(); }
   std::size_t first_of(std::size_t contact) const { return rows_.paths().lasting_rows() + 3 * contact; }
   void prepare_contacts() {
-    contact_solves_.resize(laws_.empty() ? 0 : closures().size());
-    for (std::size_t closure = 0; closure < contact_solves_.size(); ++closure) {
-      if (!closures()[closure].touches()) continue;
-      contact_solves_[closure] = std::make_unique<ContactSolve>();
-      contact_solves_[closure]->prepare(of_step_.product_of(closure));
+    for (std::size_t closure = 0; !laws_.empty() && closure < closures().size(); ++closure) {
+      if (closures()[closure].touches()) contact_solves_.prepare(closure, of_step_.product_of(closure));
     }
   }
   /// Changes of multipliers with which contacts of a closure fulfil their laws, and its other rows open by what they are to.
@@ -409,7 +405,7 @@ class CouplingSweeps {
       firsts_.push_back(k);
       laws_there_.push_back(laws_[(row - rows_.paths().lasting_rows()) / 3]);
     }
-    contact_solves_[closure]->solve({yields_, firsts_, laws_there_, multipliers_, changes_}, right_side);
+    contact_solves_[closure].solve({yields_, firsts_, laws_there_, multipliers_, changes_}, right_side);
     for (std::size_t k = 0; k < rows.size(); ++k) guess_[rows[k]] = lambda_[rows[k]] + right_side[k];
   }
 
@@ -429,7 +425,7 @@ class CouplingSweeps {
   CouplingSprings<S> springs_;
   std::vector<ContactLaw> laws_;          // of each contact
   std::vector<S> guess_;                  // of each row, the multiplier that a solve begins with
-  std::vector<std::unique_ptr<ContactSolve>> contact_solves_;  // of each closure that has contacts
+  ContactSolves contact_solves_;          // of each closure that has contacts
   std::vector<S> yields_, multipliers_, changes_;  // scratch: of the rows that close together
   std::vector<std::size_t> firsts_;                // likewise
   std::vector<ContactLaw> laws_there_;             // likewise

@@ -367,4 +367,19 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
   for (std::size_t j = 0; j < right_side.size(); ++j) right_side[j] = z_[static_cast<Eigen::Index>(j)];
 }
 
+ContactSolves::ContactSolves() = default;
+ContactSolves::~ContactSolves() = default;
+
+void ContactSolves::prepare(std::size_t closure, ContactSolve::Product product) {
+  if (closure >= solves_.size()) solves_.resize(closure + 1);
+  solves_[closure] = std::make_unique<ContactSolve>();
+  solves_[closure]->prepare(std::move(product));
+}
+
+ContactSolve& ContactSolves::operator[](std::size_t closure) { return *solves_[closure]; }
+
+void ContactSolves::renew(std::size_t closure) {
+  if (closure < solves_.size() && solves_[closure]) solves_[closure]->renew();
+}
+
 }  // namespace linden

@@ -35,6 +35,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -127,6 +128,24 @@ class ContactSolve {
   std::vector<double> loads_;                   // N of each contact, times h^2
   bool any_linear_ = false, is_factored_ = false, is_read_ = false;
   int rounds_ = 0, corrections_ = 0, factors_ = 0;
+};
+
+/// Of closures, by their numbers; not inline, as above.
+class ContactSolves {
+ public:
+  ContactSolves();
+  ~ContactSolves();
+  ContactSolves(const ContactSolves&) = delete;
+  ContactSolves& operator=(const ContactSolves&) = delete;
+
+  void prepare(std::size_t closure, ContactSolve::Product product);
+  /// Of a closure that is prepared.
+  ContactSolve& operator[](std::size_t closure);
+  /// See ContactSolve; of one that is not prepared nothing.
+  void renew(std::size_t closure);
+
+ private:
+  std::vector<std::unique_ptr<ContactSolve>> solves_;
 };
 
 }  // namespace linden
