@@ -163,7 +163,11 @@ bool act_from_outside(const Effects& effects) {
   Effects::each(effects, [&]<class Entry>(std::span<const Entry> entries, std::string_view) {
     any = any || (Entry::facts.site == Site::body && !entries.empty());
   });
-  return any;
+  // what is fixed to the world takes what it is pushed with
+  const auto touches_world = [](const PairContact& contact) {
+    return std::ranges::any_of(contact.pairs, [&](const auto& pair) { return contact.shapes[pair.first].slot == 0; });
+  };
+  return any || (effects.contact && touches_world(*effects.contact));
 }
 
 }  // namespace linden

@@ -141,7 +141,7 @@ std::vector<Servo> servo_everywhere(const Model& model, double stiffness, double
 /// Throws InputError where limits leave no room.
 std::vector<JointLimit> on_leaders(const Model& model, const std::vector<JointLimit>& list);
 
-/// Whether one takes momentum out of the system or brings it in: wrenches, drag, ground.
+/// Whether one takes momentum out of the system or brings it in: wrenches, drag, ground, contact with what is fixed to the world.
 bool act_from_outside(const Effects& effects);
 
 /// Throws InputError where an effect names what is not there or cannot have it (a row out of range, a screw's effect on a ball or
