@@ -236,7 +236,7 @@ TEST_CASE("the crate of table.yaml comes to lie on the table, and is stopped by 
   CHECK(stopped[2] == Approx(1 + 0.4).margin(1e-5));
   CHECK(stopped[1] > post - 1e-5);
   std::vector<std::string> notes;
-  CHECK(act_from_outside(scene.effects));  // the table and the post take momentum; two crates alone would keep it
+  CHECK(act_from_outside(scene.effects));  // the table and the post take momentum
   PairContact crates = *scene.effects.contact;
   std::erase_if(crates.pairs, [&](const auto& pair) { return crates.shapes[pair.first].slot == 0; });
   Effects alone;
