@@ -1,6 +1,6 @@
 // Checkpoints of a Simulation (engine/checkpoint_bytes.hpp):
 //
-//   "linden checkpoint 7\n"
+//   "linden checkpoint 8\n"
 //   header: what it belongs to, steps taken, valid rows of history, order, count of the stepper's numbers, bytes of the text that follows and
 //   of what was set
 //   kinds of effects and what they act on (engine/effects/effect_owners.hpp); their numbers may be others
@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <type_traits>
 
 #include "engine/checkpoint_bytes.hpp"
 #include "engine/effects/effect_owners.hpp"
@@ -76,9 +77,12 @@ std::optional<double> set(double number, double own) {
 bool is_finite(double number) { return std::isfinite(number); }
 
 /// Sizes of all that is kept of a step's impulses.
+/// But for touches, which are as many as there are in a step.
 std::vector<std::size_t> sizes_of(const StepImpulses& impulses) {
   std::vector<std::size_t> sizes;
-  each_member(impulses, [&](const auto& numbers) { sizes.push_back(numbers.size()); });
+  each_member(impulses, [&](const auto& numbers) {
+    if constexpr (!std::is_same_v<std::decay_t<decltype(numbers)>, std::vector<TouchImpulse>>) sizes.push_back(numbers.size());
+  });
   return sizes;
 }
 
@@ -133,6 +137,11 @@ void Simulation::check_continued(const Continued& from, const std::function<void
   if (!from.impulses) return;
   stepper_->keep_impulses();
   if (sizes_of(*from.impulses) != sizes_of(stepper_->impulses())) impossible("forces of other effects");
+  const std::size_t pairs = effects.contact ? effects.contact->pairs.size() : 0;
+  const auto is_slot = [&](Index slot) { return slot >= 0 && slot < model_->tree.shape.slots; };
+  for (const TouchImpulse& touch : from.impulses->touches) {
+    if (touch.pair >= pairs || !is_slot(touch.slot_a) || !is_slot(touch.slot_b)) impossible("contacts of other bodies");
+  }
 }
 
 void Simulation::go_on(const Continued& from) {

@@ -54,6 +54,7 @@ set(linden_public_headers
   layout/couplings.hpp
   layout/effects.hpp
   layout/field.hpp
+  layout/height_field.hpp
   layout/model.hpp
   layout/names.hpp
   layout/pose.hpp

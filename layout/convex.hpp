@@ -9,6 +9,8 @@
 //   cylinder   radius in [0], half length along z in [2] cylinder with round rims
 //   ellipsoid  semi-axes along x, y, z
 //   hull       -                                         hull with round edges
+//   plane      -                                         the half space below z = 0, without end; of the world alone
+//   heights    -                                         not convex: what lies below a height field's surface, z up; of the world alone
 //
 // Any half may be 0: a box is then a plate or a line, a cylinder a disc.
 #pragma once
@@ -20,6 +22,7 @@
 #include <vector>
 
 #include "layout/field.hpp"
+#include "layout/height_field.hpp"
 #include "layout/pose.hpp"
 
 namespace linden {
@@ -41,14 +44,18 @@ struct ConvexHull {
   double reach = 0;                        // distance of the farthest point from the origin [m]
 };
 
-enum class ConvexKind : std::uint8_t { point, segment, box, cylinder, ellipsoid, hull };
+enum class ConvexKind : std::uint8_t { point, segment, box, cylinder, ellipsoid, hull, plane, heights };
 
 struct ConvexShape {
   ConvexKind kind = ConvexKind::point;
   std::array<double, 3> half{};                    // [m]
   double radius = 0;                               // about the core [m]
   std::shared_ptr<const ConvexHull> hull{};        // of that kind alone; never empty there
+  std::shared_ptr<const HeightField> heights{};    // likewise
 };
+
+/// Whether it goes on without end.
+constexpr bool is_endless(ConvexKind kind) { return kind == ConvexKind::plane || kind == ConvexKind::heights; }
 
 /// One of a model.
 struct ConvexBody {

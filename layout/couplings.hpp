@@ -25,6 +25,9 @@
 //   face_contact    d_x, d_y; of the middles d_z - roundings           3   a has the face, z is fixed in it
 //   round_contact   d_x, d_y; of the middles |d| - roundings           3
 //
+// What of b is an ellipsoid or a circle rolls on the face likewise, by its `oval` Q, the sum of the squares of its semi-axes as dyads: its place that
+// lies lowest along n, as b sees it, is Q n / sqrt(n.Q n) before its centre, at q^k and at q^k+1. A point that turned on with the body would rise.
+//
 // Rows may give way: springs and dampers along their gaps instead of multipliers (kernels/couplings/compliance.hpp). A rod that does is a
 // spring between two points. A bushing has nothing but such rows, those that have a stiffness or damping.
 #pragma once
@@ -93,6 +96,7 @@ struct Coupling {
   double offset = 0;             // of a gear
   std::vector<CablePoint> points{};  // of a cable, from end to end
   std::array<double, 2> rounding{};  // [m], of a contact
+  std::array<double, 6> oval{};      // of a contact: xx xy xz yy yz zz in B [m^2]; all 0: none
   Compliances shift{}, turn{};   // of rows in m [N/m, N s/m]; of angles, products, which near zero are angles, and gears [N m, N m s]
 };
 

@@ -8,24 +8,33 @@
 //   cylinder   radius, length along z
 //   capsule    radius, length along z from the centre of one round end to that of the other
 //   mesh       scale along x, y, z of the points in its file; a negative one mirrors
+//   ellipsoid  semi-axes along x, y, z; of the world alone
+//   plane      -; all that lies below z = 0, without end; of the world alone
+//   heights    -; all that lies below a height field, z up; of the world alone
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "layout/field.hpp"
+#include "layout/height_field.hpp"
 #include "layout/pose.hpp"
 
 namespace linden {
 
-enum class ShapeKind : std::uint8_t { sphere, box, cylinder, capsule, mesh };
+enum class ShapeKind : std::uint8_t { sphere, box, cylinder, capsule, mesh, ellipsoid, plane, heights };
+
+/// Links that move have none of these.
+constexpr bool is_of_world_alone(ShapeKind kind) { return kind == ShapeKind::ellipsoid || kind == ShapeKind::plane || kind == ShapeKind::heights; }
 
 struct CollisionShape {
   ShapeKind kind = ShapeKind::sphere;
   std::array<double, 3> size{};  // [m], of a mesh [1]; what a kind does not use is 0
   std::string mesh;              // the file, as the source calls it
+  std::shared_ptr<const HeightField> heights{};  // of that kind alone
 };
 
 /// A shape of a link; the centre of all but meshes is the pose's.

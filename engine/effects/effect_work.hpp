@@ -68,11 +68,13 @@ struct EffectAccount {
   EffectWork work;
   std::array<LeastLoss, kEffectLists> least;
   double kinetic = 0;  // of the mean motion [J]
+  double freed = 0;    // what contacts may give that push out of each other what began, or was found, within each other [J]
 
   void add(const EffectAccount& part) {
     work.add(part.work);
     for (std::size_t k = 0; k < least.size(); ++k) least[k].see(part.least[k].at, part.least[k].loss);
     kinetic = part.kinetic;
+    freed += part.freed;
   }
 };
 

@@ -5,7 +5,8 @@
 //
 // A loss is booked along the mean of neighbouring displacements, so that of a single step may be negative by what second order leaves where a
 // motion turns. What is told is a gift above kGift of the energy that went to and fro: the largest kinetic energy of a step, or what all
-// effects did together, so that it does not shrink as things come to rest.
+// effects did together, so that it does not shrink as things come to rest. What contacts give to bodies that began within each other, where they push
+// them out, is no gift: half of it is given in the step that follows, since work goes along the mean of two.
 #pragma once
 
 #include <array>
@@ -41,6 +42,7 @@ class PassiveWatch {
   };
   struct Known {
     double scale = 0, done = 0;
+    double owed = 0;  // what contacts may yet give to what they pushed out of each other in the last step [J]
     std::array<Watched, kEffectLists> watched{};  // list by list
     std::vector<PassiveGift> gifts{};
   };

@@ -141,13 +141,20 @@ std::vector<const BodyShape*> world_shapes(const Model& model) {
 }
 
 /// "box 1 x 0.6 x 0.04 m", "sphere, radius 0.1 m", "mesh rock.stl"
-std::string size_text(const CollisionShape& shape) {
+std::string size_text(const BodyShape& placed) {
+  const CollisionShape& shape = placed.shape;
   const std::array<double, 3>& size = shape.size;
+  const std::array<double, 9>& turn = placed.pose.rotation;
   switch (shape.kind) {
     case ShapeKind::sphere: return fmt::format("sphere, radius {:g} m", size[0]);
     case ShapeKind::box: return fmt::format("box {:g} x {:g} x {:g} m", size[0], size[1], size[2]);
     case ShapeKind::cylinder: return fmt::format("cylinder, radius {:g} m, length {:g} m", size[0], size[1]);
     case ShapeKind::capsule: return fmt::format("capsule, radius {:g} m, length {:g} m", size[0], size[1]);
+    case ShapeKind::ellipsoid: return fmt::format("ellipsoid, semi-axes {:g}, {:g} and {:g} m", size[0], size[1], size[2]);
+    case ShapeKind::plane: return fmt::format("plane, normal {:g} {:g} {:g}", turn[2] + 0.0, turn[5] + 0.0, turn[8] + 0.0);
+    case ShapeKind::heights:
+      return fmt::format("heights, {} x {} points, {:g} and {:g} m apart", shape.heights->columns, shape.heights->rows, shape.heights->spacing_x,
+                         shape.heights->spacing_y);
     case ShapeKind::mesh: break;
   }
   return fmt::format("mesh {}", printable(shape.mesh));
@@ -319,7 +326,7 @@ class Printer {
     say("\nshapes that stand in the world\n");
     for (const BodyShape* shape : std::span(shapes).first(shown(shapes.size()))) {
       const std::array<double, 3>& at = shape->pose.shift;
-      say("  {}: {}, at {:g} {:g} {:g}\n", printable(shape->link), size_text(shape->shape), at[0], at[1], at[2]);
+      say("  {}: {}, at {:g} {:g} {:g}\n", printable(shape->link), size_text(*shape), at[0], at[1], at[2]);
     }
     left_out(shapes.size());
   }
@@ -472,7 +479,7 @@ Json json_of(const InspectArguments& arguments, const Model& model, const Costs&
   for (const MergedLink& link : merged_links(model)) merged.push_back({{"link", link.name}, {"slot", link.slot}});
   Json& world = result["world"] = Json::array();
   for (const BodyShape* shape : world_shapes(model)) {
-    world.push_back({{"link", shape->link}, {"shape", size_text(shape->shape)}, {"position", shape->pose.shift}, {"rotation", shape->pose.rotation}});
+    world.push_back({{"link", shape->link}, {"shape", size_text(*shape)}, {"position", shape->pose.shift}, {"rotation", shape->pose.rotation}});
   }
   Json& mimics = result["mimics"] = Json::array();
   for (const Mimic& mimic : model.mimics) {

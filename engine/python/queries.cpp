@@ -280,7 +280,8 @@ void bind_proximity(nb::module_& m) {
         return fmt::format("LinkDistance(distance={:.6g}, normal=[{:.6g}, {:.6g}, {:.6g}])", self.distance, self.normal[0], self.normal[1],
                            self.normal[2]);
       });
-  nb::class_<NearPair>(m, "NearPair", "Two collision shapes that are near each other, and the one to four points where they meet, world frame.")
+  nb::class_<NearPair>(m, "NearPair", "Two collision shapes that are near each other, and the points where they meet, world frame. What is near heights of "
+                       "the world is so along one or several normals, a pair each.")
       .def_ro("link_a", &NearPair::link_a)
       .def_ro("link_b", &NearPair::link_b)
       .def_ro("distance", &NearPair::distance, "[m]; negative where they overlap, by the least shift that would part them.")
@@ -325,8 +326,8 @@ void bind_proximity(nb::module_& m) {
             return freely([&] { return self.distance(state, link_a, link_b); });
           },
           "state"_a, "link_a"_a, "link_b"_a,
-          "Of the nearest collision shapes of two links, neighbours too. An unknown link, one without a collision shape and a link with itself are "
-          "an InputError.")
+          "Of the nearest collision shapes of two links, neighbours too. An unknown link, one without a collision shape, a link with itself and "
+          "heights of the world, of which near tells, are an InputError.")
       .def(
           "near", [](const Proximity& self, const Kinematics& state, double margin) { return freely([&] { return self.near(state, margin); }); },
           "state"_a, "margin"_a,

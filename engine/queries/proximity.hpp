@@ -9,7 +9,8 @@
 //
 // The distance of two shapes is that of their nearest points, or less than zero by the least shift that would part them; of links that of the
 // nearest pair of their shapes. Only near() leaves pairs out (models/shapes/collision_pairs.hpp): neighbours in the tree, which overlap by design,
-// and others like them.
+// and others like them. Heights of the world, which are not convex, have no one distance: near() tells what is near them, a pair for each normal of
+// their surface there.
 //
 // cost    distance: every pair of shapes of the two links; near: O(n log n) of all shapes and each pair whose boxes meet
 #pragma once
@@ -38,14 +39,14 @@ struct NearPoint {
   std::uint64_t feature;        // which corners, edges, faces meet: the same as long as these do
 };
 
-/// Two shapes: links that have several may be in more than one of these.
+/// Two shapes: links that have several may be in more than one of these, and so may one that is near heights of the world along several normals.
 struct NearPair {
   std::string link_a, link_b;
   Index slot_a, slot_b;          // bodies that carry them
   std::size_t shape_a, shape_b;  // places among the shapes of the model, those fixed to the world first
   double distance;               // [m]
   std::array<double, 3> normal;  // from a to b, unit length, world frame
-  std::vector<NearPoint> points;  // one to four, those with a gap of no more than the margin, by feature
+  std::vector<NearPoint> points;  // one to four, of heights to 16, those with a gap of no more than the margin, by feature
 };
 
 class Proximity {
@@ -57,7 +58,7 @@ class Proximity {
   Proximity& operator=(Proximity&&) noexcept;
 
   /// Of two links, neighbours and disabled ones too. Throws InputError for an unknown link, with the nearest name, for one that has no collision
-  /// shape, and for a link and itself. state: of the model that this was made of, or an equal one.
+  /// shape, for a link and itself, for two planes, and for heights. state: of the model that this was made of, or an equal one.
   LinkDistance distance(const Kinematics& state, const std::string& link_a, const std::string& link_b) const;
 
   /// All pairs of shapes that are no farther apart than the margin [m], in the order of their places. Throws InputError for a margin that is

@@ -16,9 +16,9 @@ inline constexpr JointKind kLastOf<JointKind> = JointKind::free;
 template <>
 inline constexpr CouplingKind kLastOf<CouplingKind> = static_cast<CouplingKind>(kCouplingKinds - 1);
 template <>
-inline constexpr ShapeKind kLastOf<ShapeKind> = ShapeKind::mesh;
+inline constexpr ShapeKind kLastOf<ShapeKind> = ShapeKind::heights;
 template <>
-inline constexpr ConvexKind kLastOf<ConvexKind> = ConvexKind::hull;
+inline constexpr ConvexKind kLastOf<ConvexKind> = ConvexKind::heights;
 template <>
 inline constexpr Solver kLastOf<Solver> = Solver::riqn;
 template <>
@@ -28,8 +28,8 @@ inline constexpr StopTest kLastOf<StopTest> = StopTest::absolute;
 
 namespace {
 
-constexpr std::string_view kModelLine = "linden model 3\n", kAnyModel = "linden model ";
-constexpr std::string_view kSceneLine = "linden scene 3\n", kAnyScene = "linden scene ";
+constexpr std::string_view kModelLine = "linden model 4\n", kAnyModel = "linden model ";
+constexpr std::string_view kSceneLine = "linden scene 4\n", kAnyScene = "linden scene ";
 
 template <class T>
 std::string bytes_of(const T& value) {
@@ -66,10 +66,13 @@ class ModelCheck {
   }
   void check_shape(const BodyShape& shape) const {
     require(moves(shape.slot), "a shape of a body that there is not");
+    require(!is_of_world_alone(shape.shape.kind), "a shape of the world on a body that moves");
     check_place(shape.pose);
   }
   void check_welded_shape(const BodyShape& shape) const {
     require(shape.slot == 0, "a fixed shape on a body that moves");
+    require((shape.shape.kind == ShapeKind::heights) == (shape.shape.heights != nullptr), "heights of a shape that has none, or the other way round");
+    require(!shape.shape.heights || is_whole(*shape.shape.heights), "heights that are no grid");
     check_place(shape.pose);
   }
   bool moves(Index slot) const { return slot > 0 && slot < tree_.shape.slots; }

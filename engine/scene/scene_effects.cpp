@@ -12,6 +12,7 @@
 #include "engine/scene/number_table.hpp"
 #include "engine/scene/scene_time_table.hpp"
 #include "engine/scene/scene_joints.hpp"
+#include "engine/scene/scene_heights.hpp"
 #include "engine/scene/scene_numbers.hpp"
 #include "engine/scene/scene_servos.hpp"
 #include "engine/text.hpp"
@@ -47,10 +48,10 @@ const std::vector<std::string> kWrench{"force", "moment", "point", "frame", "fro
 const std::vector<std::string> kFrames{"world", "body"};
 const std::vector<std::string> kDrag{"linear", "quadratic", "wind", "bodies"};
 const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
+const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
 const std::vector<std::string> kContact{"stiffness", "damping", "friction", "restitution", "between", "pairs", "except", "srdf"};
 const std::vector<std::string> kBetweenKeys{"links", "stiffness", "damping", "friction", "restitution"};
-const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 
 /// By which a curve may round beyond a limit that one of its points lies on [rad, m].
 constexpr double kCurveRounding = 1e-9;
@@ -328,7 +329,10 @@ class EffectsReader {
       if (const auto value = at.find("stiffness")) ground.stiffness = value->positive();
       if (const auto value = at.find("damping")) ground.damping = value->not_negative();
       if (const auto value = at.find("friction")) ground.friction = value->not_negative();
-      if (const auto value = at.find("terrain")) ground.terrain = terrain(*value);
+      if (const auto value = at.find("terrain")) {
+        value->entries_of(kTerrain);
+        ground.terrain = read_heights(*value, folder_);
+      }
     }
     std::vector<std::string> notes;
     ground.contacts = contacts_of(model_, notes);
@@ -417,30 +421,6 @@ class EffectsReader {
   static LinkPairs joined(LinkPairs pairs, const LinkPairs& more) {
     pairs.insert(pairs.end(), more.begin(), more.end());
     return pairs;
-  }
-
-  HeightField terrain(const SceneValue& at) const {
-    at.entries_of(kTerrain);
-    const auto file = at.find("file"), spacing = at.find("spacing"), origin = at.find("origin");
-    if (!file || !spacing)
-      at.fail(fmt::format("{} has no {}", at.path(), file ? "spacing" : "file"), "file and spacing", "add it");
-    const std::vector<double> apart = spacing->numbers(2, "[dx, dy] in m");
-    if (!(apart[0] > 0) || !(apart[1] > 0))
-      spacing->fail(fmt::format("{} holds {} and {}", spacing->path(), apart[0], apart[1]), "two numbers above zero",
-                    "change them");
-    const std::vector<double> begin = origin ? origin->numbers(2, "[x, y] in m") : std::vector<double>{0, 0};
-    const std::string path = scene_path(*file, folder_);
-    const NumberTable table = file->located([&] { return read_numbers(path, 0, 2); });
-    if (table.rows.size() < 2) file->fail(fmt::format("{} has one row", path), "two or more, each along x", "add heights");
-    HeightField field{.columns = static_cast<Index>(table.rows.front().size()),
-                      .rows = static_cast<Index>(table.rows.size()),
-                      .spacing_x = apart[0],
-                      .spacing_y = apart[1],
-                      .origin_x = begin[0],
-                      .origin_y = begin[1],
-                      .heights = {}};
-    for (const std::vector<double>& row : table.rows) field.heights.insert(field.heights.end(), row.begin(), row.end());
-    return field;
   }
 
   const Model& model_;

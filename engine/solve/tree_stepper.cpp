@@ -363,8 +363,9 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
       effects_.end_joints(work_.delta, work_.motion, Stopped::struck, sweeps_.joint_residual(), work_.end_impulse);
     }
     if (effects_.plan().bodies) effects_.end_bodies(work_.placement, work_.displacement, work_.impulse);
-    sweeps_.end_contacts(h, before_, [&](Index slot, double taken) {
+    sweeps_.end_contacts(h, before_, [&](Index slot, double taken, double freed) {
       part.work.of<PairContact>() += taken;
+      part.freed += freed;
       part.least[kListOf<PairContact>].see(slot, taken);
     });
     if (impulses_.kept()) sweeps_.account_for_contacts(h, impulses_);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "kernels/collision/convex_pair.hpp"
+#include "kernels/collision/height_contacts.hpp"
 #include "kernels/effects/ground_contact.hpp"
 #include "kernels/values/se3.hpp"
 
@@ -29,6 +30,47 @@ Placement<double> placement(const Pose& pose) {
 
 /// Whether what touches by it turns as a ball does, about its middle.
 bool is_round(const ConvexShape& shape) { return shape.kind == ConvexKind::point || shape.kind == ConvexKind::segment; }
+
+/// Of two shapes the one that is rounder rolls on the other, which is taken for flat there.
+int roundness(const ConvexShape& shape) {
+  return is_round(shape) ? 2 : shape.kind == ConvexKind::cylinder || shape.kind == ConvexKind::ellipsoid ? 1 : 0;
+}
+
+/// A cylinder that stands within this sine of upright does so on places of its rim, which are no lowest ones of the circle.
+constexpr double kStands = 0.02;
+/// Nor is a place that is farther than this share of its radius from the one that is.
+constexpr double kLowest = 0.01;
+/// Whether a shape lies with a face where its normal is n; not with an edge or a corner, nor with what is round.
+bool lies_flat(const ConvexShape& shape, const Pose& pose, const Vec3<double>& n) {
+  constexpr double kAlong = 1 - 1e-9;
+  const Vec3<double> own = transpose_times(Mat3<double>::from(pose.rotation.data()), n);
+  if (shape.kind == ConvexKind::plane) return true;
+  if (shape.kind == ConvexKind::box) return std::max({std::abs(own.x), std::abs(own.y), std::abs(own.z)}) > kAlong;
+  if (shape.kind == ConvexKind::cylinder) return std::abs(own.z) > kAlong;
+  if (shape.kind != ConvexKind::hull) return false;
+  return std::ranges::any_of(shape.hull->faces, [&](const ConvexHull::Face& face) { return dot(vector(face.normal.data()), own) > kAlong; });
+}
+
+/// As Coupling::oval of a shape that meets a face with this place of its core: of what is round a ball, an ellipsoid itself, of a cylinder the circle
+/// about its axis there, be it its rim or its side. d: the rows of Touch::across.
+std::array<double, 6> oval_of(const ConvexShape& shape, const Pose& pose, const std::array<double, 9>& d, const Vec3<double>& place) {
+  if (roundness(shape) == 0) return {};
+  if (is_round(shape)) return {shape.radius * shape.radius, 0, 0, shape.radius * shape.radius, 0, shape.radius * shape.radius};
+  const Mat3<double> axes = transpose(Mat3<double>::from(pose.rotation.data())), across = Mat3<double>::from(d.data());
+  const bool is_circle = shape.kind == ConvexKind::cylinder;
+  std::array<double, 6> oval{};
+  for (const Vec3<double>& semi_axis : {shape.half[0] * axes.x, shape.half[is_circle ? 0 : 1] * axes.y, (is_circle ? 0 : shape.half[2]) * axes.z}) {
+    const Vec3<double> u = across * semi_axis;
+    const std::array more{u.x * u.x, u.x * u.y, u.x * u.z, u.y * u.y, u.y * u.z, u.z * u.z};
+    for (std::size_t k = 0; k < more.size(); ++k) oval[k] += more[k];
+  }
+  const double radius = shape.half[0], depth = std::sqrt(oval[5]);
+  if (!is_circle) return depth > 0 ? oval : std::array<double, 6>{};
+  if (depth <= kStands * radius) return {};
+  const Vec3<double> middle = place - vector(pose.shift.data()) + transpose_times(across, Vec3<double>{oval[2] / depth, oval[4] / depth, depth});
+  const Vec3<double> off = middle - dot(middle, axes.z) * axes.z;
+  return dot(off, off) <= kLowest * radius * kLowest * radius ? oval : std::array<double, 6>{};
+}
 
 double half_of(std::uint64_t feature, int half) { return static_cast<double>(half == 0 ? feature >> 32 : feature & 0xffffffffu); }
 
@@ -65,15 +107,19 @@ BodyContacts::BodyContacts(const PairContact& contact, const Model& model) : con
   for (const auto& [a, b] : contact.pairs) lighter_.push_back(std::min(mass(a), mass(b)));
   for (const ConvexBody& shape : contact.shapes) reach_.push_back(core_reach(shape.shape) + shape.shape.radius);
   poses_.resize(contact.shapes.size());
-  // of two shapes the smaller decides, so that the largest need not look farther than the next
+  // of two shapes the smaller decides, so that the largest need not look farther than the next; what has no end meets the largest of the others
   std::vector<double> sorted = reach_;
   std::ranges::sort(sorted, std::greater());
-  for (const double reach : reach_) near_.push_back(0.5 * kNearBy * std::min(reach, sorted[std::min<std::size_t>(1, sorted.size() - 1)]));
+  const auto endless = static_cast<std::size_t>(std::ranges::count(sorted, std::numeric_limits<double>::infinity()));
+  const double next = endless < sorted.size() ? sorted[std::min(std::max<std::size_t>(1, endless), sorted.size() - 1)] : 0;
+  for (const double reach : reach_) near_.push_back(0.5 * kNearBy * std::min(reach, next));
   for (std::uint32_t a = 0; a <= contact.shapes.size(); ++a) {
     const auto of_a = std::ranges::lower_bound(contact.pairs, std::pair(a, std::uint32_t(0)));
     first_pair_.push_back(static_cast<std::size_t>(of_a - contact.pairs.begin()));
   }
-  memory_.assign(first_number() + kNumbers * std::min(kMostOfShape * contact.shapes.size(), 4 * contact.pairs.size()), 0.0);
+  std::size_t most = 0;
+  for (const auto& [a, b] : contact.pairs) most += contact.shapes[a].shape.heights ? kMostHeightContacts : 4;
+  memory_.assign(first_number() + kNumbers * std::min(kMostOfShape * contact.shapes.size(), most), 0.0);
   forget();
 }
 
@@ -128,27 +174,40 @@ void BodyContacts::add(std::size_t pair, double margin, const Field<double, 12>&
   const Vec3<double> apart = vector(poses_[b].shift.data()) - vector(poses_[a].shift.data());
   const double reach = reach_[a] + reach_[b] + margin;
   if (dot(apart, apart) > reach * reach) return;
-  const ContactPatch patch = contact_patch(contact_.shapes[a].shape, poses_[a], contact_.shapes[b].shape, poses_[b], margin);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(patch.count); ++k) {
-    const PatchPoint& point = patch.points[k];
-    const bool swapped = is_round(contact_.shapes[a].shape) && !is_round(contact_.shapes[b].shape);
-    const ConvexBody &first = contact_.shapes[swapped ? b : a], &second = contact_.shapes[swapped ? a : b];
-    const Vec3<double> n = swapped ? -1.0 * patch.normal : patch.normal, half = (0.5 * point.gap) * n;
-    touches_.push_back({pair, point.feature, point.gap, {point.place.x, point.place.y, point.place.z}, directions_of(n)});
-    const std::array<double, 9>& d = touches_.back().across;
-    const Mat3<double> R = transpose(Mat3<double>{vector(&d[0]), vector(&d[3]), vector(&d[6])});
-    const bool both = is_round(first.shape) && is_round(second.shape);
-    const CouplingKind kind = both ? CouplingKind::round_contact : CouplingKind::face_contact;
-    if (touches_.size() > couplings_.size()) couplings_.emplace_back();
-    Coupling& coupling = couplings_[touches_.size() - 1];
-    changed_ = changed_ || coupling.kind != kind || coupling.slot_a != first.slot || coupling.slot_b != second.slot;
-    coupling.kind = kind;
-    coupling.slot_a = first.slot;
-    coupling.slot_b = second.slot;
-    coupling.frame_a = pose_in(load<Placement, double>(pose, first.slot), R, point.place - half);
-    coupling.frame_b = pose_in(load<Placement, double>(pose, second.slot), R, point.place + half);
-    coupling.rounding = {both ? first.shape.radius : 0, is_round(second.shape) ? second.shape.radius : 0};
+  if (const auto& heights = contact_.shapes[a].shape.heights) {
+    HeightContacts found;
+    height_contacts(*heights, poses_[a], contact_.shapes[b].shape, poses_[b], margin, found);
+    for (std::size_t k = 0; k < found.count; ++k) add_place(pair, found.at[k].normal, found.at[k].point, found.at[k].on_face, pose);
+    return;
   }
+  const ContactPatch patch = contact_patch(contact_.shapes[a].shape, poses_[a], contact_.shapes[b].shape, poses_[b], margin);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(patch.count); ++k) add_place(pair, patch.normal, patch.points[k], false, pose);
+}
+
+void BodyContacts::add_place(std::size_t pair, const Vec3<double>& normal, const PatchPoint& point, bool on_face, const Field<double, 12>& pose) {
+  const auto& [a, b] = contact_.pairs[pair];
+  const bool swapped = roundness(contact_.shapes[a].shape) > roundness(contact_.shapes[b].shape);
+  const ConvexBody &first = contact_.shapes[swapped ? b : a], &second = contact_.shapes[swapped ? a : b];
+  const Vec3<double> n = swapped ? -1.0 * normal : normal, half = (0.5 * point.gap) * n;
+  touches_.push_back({pair, point.feature, point.gap, {point.place.x, point.place.y, point.place.z}, directions_of(n)});
+  const std::array<double, 9>& d = touches_.back().across;
+  const Mat3<double> R = transpose(Mat3<double>::from(d.data()));
+  const bool both = is_round(first.shape) && is_round(second.shape);
+  const CouplingKind kind = both ? CouplingKind::round_contact : CouplingKind::face_contact;
+  if (touches_.size() > couplings_.size()) couplings_.emplace_back();
+  Coupling& coupling = couplings_[touches_.size() - 1];
+  changed_ = changed_ || coupling.kind != kind || coupling.slot_a != first.slot || coupling.slot_b != second.slot;
+  coupling.kind = kind;
+  coupling.slot_a = first.slot;
+  coupling.slot_b = second.slot;
+  coupling.frame_a = pose_in(load<Placement, double>(pose, first.slot), R, point.place - half);
+  coupling.frame_b = pose_in(load<Placement, double>(pose, second.slot), R, point.place + half);
+  // a ball on an edge keeps a place on it, and not its own lowest one
+  const bool rolls = !both && (!is_round(second.shape) || on_face || lies_flat(first.shape, poses_[swapped ? b : a], n));
+  const bool has_core = roundness(second.shape) == 1 || (is_round(second.shape) && !rolls);
+  coupling.rounding = {both ? first.shape.radius : 0, has_core ? second.shape.radius : 0};
+  coupling.oval = {};
+  if (rolls) coupling.oval = oval_of(second.shape, poses_[swapped ? a : b], d, point.place + half + coupling.rounding[1] * n);
 }
 
 /// They are in the order of pairs, and end where nothing is remembered.
@@ -187,7 +246,7 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
   const ContactMaterial& material = contact_.material(at.pair);
   const double rigid = kRigid * lighter_[at.pair] / (h * h), stiffness = std::min(material.stiffness, rigid);
   Step& step = steps_[touch];
-  step = {.law = {h * h * stiffness, material.friction, h * kCreep, 0}, .stiffness = stiffness, .spring_lift = 0};
+  step = {.law = {h * h * stiffness, material.friction, h * kContactCreep, 0}, .stiffness = stiffness, .spring_lift = 0};
   const double fall = 2 * h * h * gravity;
   if (material.restitution > 0 && -opened > h * kLeastRebound + fall && at.gap + opened < fall) {
     step.law.stiffness = h * h * rigid;
@@ -199,7 +258,8 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
   double borne = 0;  // the deepest of it
   for (std::size_t one = 0; one < of_pair.size(); one += kNumbers) borne = std::max(borne, of_pair[one + kDepthAt]);
   const double gap = std::min(0.0, at.gap);
-  step.spring_lift = std::max(0.0, -gap - borne - h * kRecoverySpeed);
+  step.found = std::max(0.0, -gap - borne);
+  step.spring_lift = std::max(0.0, step.found - h * kRecoverySpeed);
   const double spring = step.law.stiffness, damper = h * material.damping;
   step.law.stiffness = spring + damper;
   step.law.lift = (spring * step.spring_lift - damper * gap) / (spring + damper);

@@ -29,6 +29,7 @@
 #include "engine/effects/step_impulses.hpp"
 #include "engine/sweeps/coupling_sweeps.hpp"
 #include "kernels/collision/broad_phase.hpp"
+#include "kernels/collision/contact_patch.hpp"
 #include "kernels/effects/joint_impulses.hpp"
 #include "kernels/values/scalar.hpp"
 #include "layout/effects/contact.hpp"
@@ -40,6 +41,10 @@ namespace linden {
 
 /// Speed at which depth that the motion did not make may come to push [m/s].
 inline constexpr double kRecoverySpeed = 1e-2;
+
+/// Speed at which a place that sticks creeps along at the limit of its friction: 6 micrometres a minute [m/s]. Ten times as much makes piles, walls and
+/// falling humanoids no faster, a tenth makes a pile of twenty a quarter slower.
+inline constexpr double kContactCreep = 1e-7;
 
 /// What comes together more slowly does not bounce [m/s]. Of what strikes faster a thousandth of the speed is at most lost beside its restitution.
 inline constexpr double kLeastRebound = 0.05, kRigid = 1e5;
@@ -87,7 +92,7 @@ class BodyContacts {
   ContactLaw begin(std::size_t touch, double h, double opened, double gravity);
   std::array<double, 3> guess_of(std::size_t touch, double h) const;
   /// Of the step solved last, of h, before bodies are placed at its end; before, now: displacements of the step before and of this one.
-  /// book(slot of b, energy) of what each took [J].
+  /// book(slot of b, energy, freed) of what each took, and of what it may give to push out the depth that was found [J].
   template <class Book>
   void keep(double h, const CouplingSweeps<double>& solved, const Field<double>& before, const Field<double>& now, const Book& book) {
     const double stored_before = stored();
@@ -113,9 +118,11 @@ class BodyContacts {
         lasting_[k][j] = persistent(impulse[j], last[j]);
         memory_[kLasted] = lasting_[k][j] != 0 ? 1 : memory_[kLasted];
       }
-      if (given != 0) book(couplings_[k].slot_b, -given);
+      // in a first step a place bears half a weight, and works along half of the way; the other half comes with all of it
+      const double freed = 2 * forces_[k][2] * std::min(steps_[k].found, h * kRecoverySpeed);
+      if (given != 0 || freed != 0) book(couplings_[k].slot_b, -given, freed);
     }
-    if (stored() != stored_before) book(0, stored_before - stored());
+    if (stored() != stored_before) book(0, stored_before - stored(), 0.0);
     remember();
   }
   /// Whether something pushed in the step solved last as in that before: velocities are read with half of it (engine/VELOCITY.md).
@@ -144,6 +151,7 @@ class BodyContacts {
     ContactLaw law;
     double stiffness;    // of the spring alone [N/m]; 0 where the place rebounds: nothing is stored
     double spring_lift;  // ContactLaw::lift of it [m]
+    double found = 0;    // how much deeper it began than what the pair bore in the last step [m]
     double depth = 0;    // by which it is pressed at the end [m]
 
     double spring() const { return stiffness * depth; }
@@ -164,6 +172,8 @@ class BodyContacts {
   /// A number of the effect's pairs; none: their number.
   std::size_t number_of(std::uint32_t a, std::uint32_t b) const;
   void add(std::size_t pair, double margin, const Field<double, 12>& pose);
+  /// A place of a pair, with the normal from its first shape to its second. on_face: known to be one of a face of the first.
+  void add_place(std::size_t pair, const Vec3<double>& normal, const PatchPoint& point, bool on_face, const Field<double, 12>& pose);
 
   const PairContact& contact_;
   std::size_t rows_;             // of velocities

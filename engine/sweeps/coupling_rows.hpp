@@ -77,6 +77,51 @@ class CouplingRows {
     for (const Angle& angle : angles_) gap_[angle.row] = near(gap_[angle.row], angle.begin);
   }
 
+  /// The gaps of contacts there, of bodies in the world at q^k that are displaced so. What is rigid would push by 1e-7 of its load for what is rounded
+  /// of where bodies are, at every evaluation otherwise; what is rounded at q^k is the same at all of them.
+  void find_contact_gaps(const Field<S, 12>& world, const Field<S, 7>& displacement) {
+    using std::sqrt;
+    for (const CouplingPath& path : paths_.all()) {
+      const Coupling& coupling = *path.coupling;
+      if (!is_contact(coupling.kind)) continue;
+      const Moved a(coupling.slot_a, world, displacement), b(coupling.slot_b, world, displacement);
+      const Placement<S> A = placed_in(a.body, placement_of(coupling.frame_a)), B = placed_in(b.body, placement_of(coupling.frame_b));
+      const auto behind = [&](const Moved& moved, const Placement<S>& frame, double depth) { return moved.along(frame.p + as<S>(depth) * axis_of(frame.R, 2)); };
+      const Along at_a = a.along(A.p), at_b = b.along(B.p);
+      const Along middle_a = behind(a, A, -coupling.rounding[0]), middle_b = behind(b, B, coupling.rounding[1]);
+      for (int row = 0; row < 3; ++row) {
+        const Along &from = row < 2 ? at_a : middle_a, &to = row < 2 ? at_b : middle_b;
+        const Vec3<S> d = to.begin - from.begin, apart = to.way - from.way, n = axis_of(A.R, row);
+        S& gap = gap_[path.first_row + static_cast<std::size_t>(row)];
+        if (row == 2 && coupling.kind == CouplingKind::round_contact) {
+          const Vec3<S> end = d + apart;
+          const S distance = sqrt(dot(d, d));
+          gap = distance + dot(d + end, apart) / (distance + sqrt(dot(end, end)));
+        } else {
+          gap = dot(n, d) + (dot(n, apart) + dot(a.turned(n), d + apart));
+        }
+        if (row == 2) gap = gap - as<S>(coupling.rounding[0] + coupling.rounding[1]);
+      }
+      if (coupling.oval != decltype(coupling.oval){}) {
+        // axes of both frames at the end, and how far that of b is then tilted against the normal of a
+        const Vec3<S> n = axis_of(A.R, 2), tilted = a.turned(n);
+        std::array<Vec3<S>, 3> of_a, of_b;
+        std::array<S, 3> tilt;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Vec3<S> axis = axis_of(A.R, static_cast<int>(k)), other = axis_of(B.R, static_cast<int>(k)), turned = b.turned(other);
+          of_a[k] = axis + a.turned(axis);
+          of_b[k] = other + turned;
+          tilt[k] = dot(other, tilted) + dot(turned, n + tilted);
+        }
+        const Vec3<S> moved = rolled(coupling.oval, {tilt[0], tilt[1], tilt[2]});
+        const Vec3<S> way = moved.x * of_b[0] + moved.y * of_b[1] + moved.z * of_b[2];
+        gap_[path.first_row] = gap_[path.first_row] + S(0.5) * (dot(of_a[0], way) - moved.x);
+        gap_[path.first_row + 1] = gap_[path.first_row + 1] + S(0.5) * (dot(of_a[1], way) - moved.y);
+        gap_[path.first_row + 2] = gap_[path.first_row + 2] + dot(of_a[2], way);
+      }
+    }
+  }
+
   /// Of each row [m], or without a unit; by what it is judged; 1 / root of how far it would move were its bodies free.
   const std::vector<S>& gaps() const { return gap_; }
   const std::vector<S>& sizes() const { return size_; }
@@ -134,6 +179,29 @@ class CouplingRows {
   }
 
  private:
+  /// A point, and its way in a step.
+  struct Along {
+    Vec3<S> begin, way;
+  };
+  /// How a body moves in a step, by what is small where that is.
+  struct Moved {
+    Placement<S> body;  // in the world, at its beginning
+    Displacement<S> by;
+    Moved(Index slot, const Field<S, 12>& world, const Field<S, 7>& displacement)
+        : body{{{S(1.0), S(0.0), S(0.0)}, {S(0.0), S(1.0), S(0.0)}, {S(0.0), S(0.0), S(1.0)}}, {S(0.0), S(0.0), S(0.0)}},
+          by{{{S(0.0), S(0.0), S(0.0)}, S(1.0)}, {S(0.0), S(0.0), S(0.0)}} {
+      if (slot == 0) return;
+      body = load<Placement, S>(world, slot);
+      by = load<Displacement, S>(displacement, slot);
+    }
+    /// By how much a direction changes.
+    Vec3<S> turned(const Vec3<S>& n) const { return body.R * turned_within(transpose_times(body.R, n)); }
+    Along along(const Vec3<S>& x) const { return {x, body.R * (by.p + turned_within(transpose_times(body.R, x - body.p)))}; }
+
+   private:
+    Vec3<S> turned_within(const Vec3<S>& x) const { return S(2.0) * cross(by.r.v, by.r.w * x + cross(by.r.v, x)); }
+  };
+
   /// Points of a cable that are no farther apart have no direction [m].
   template <class Number>
   static constexpr double kNoDistance = is_single<Number> ? 1e-18 : 1e-150;
@@ -199,6 +267,7 @@ class CouplingRows {
         gaps[2] = gap_of(kinds[2], 0, behind(A, -coupling.rounding[0]), middle);
         gaps[2].gap = gaps[2].gap - as<S>(coupling.rounding[0] + coupling.rounding[1]);
         at[2] = middle.p;
+        if (coupling.oval != decltype(coupling.oval){}) roll(coupling.oval, B.R, gaps, at);
       }
       for (std::size_t j = 0; j < kinds.size(); ++j) gap_[path.first_row + j] = gaps[j].gap;
       for (std::size_t k = 0; numbers && k < path.joints.size(); ++k) {
@@ -220,6 +289,32 @@ class CouplingRows {
         if (kinds[j].kind == GapKind::angle) steepness_[path.first_row + j] = dot(gaps[j].couple, gaps[j].couple);
       }
     }
+  }
+
+  /// Of a contact by an oval, whose place `at` lay lowest along the normal at q^k: from there to where it does now.
+  ///
+  /// What sticks is the place that lies lowest in the middle of the step. A push at q^k where the body lies lowest then works along the mean of both
+  /// steps beside it, which hold it half a step before and half a step behind that place: held where it lay at q^k, Euler's disk gained a fifth of its
+  /// energy in 8 s.
+  static void roll(const std::array<double, 6>& oval, const Mat3<S>& R, std::array<Gap<S>, 6>& gaps, std::array<Vec3<S>, 6>& at) {
+    const Vec3<S> n = transpose_times(R, gaps[2].force), moved = rolled(oval, {n.x, n.y, n.z - S(1.0)}), in_world = R * moved;
+    gaps[2].gap = gaps[2].gap + dot(gaps[2].force, in_world);
+    at[2] = at[2] + in_world;
+    for (const std::size_t j : {0u, 1u}) {
+      gaps[j].gap = gaps[j].gap + S(0.5) * (dot(gaps[j].force, in_world) - (j == 0 ? moved.x : moved.y));
+      at[j] = at[j] + S(0.5) * in_world;
+    }
+  }
+
+  /// From the place of an oval that lies lowest along z to that which does along z + tilt.
+  static Vec3<S> rolled(const std::array<double, 6>& oval, const Vec3<S>& tilt) {
+    using std::max, std::sqrt;
+    constexpr double kNoDepth = 1e-12;  // square of how deep it is beside what it was: a circle seen along its axis
+    const auto number = [&](std::size_t k) { return as<S>(oval[k]); };
+    const Mat3<S> Q{{number(0), number(1), number(2)}, {number(1), number(3), number(4)}, {number(2), number(4), number(5)}};
+    const Vec3<S> turned = Q * tilt;
+    const S more = max(S(2.0) * turned.z + dot(tilt, turned), as<S>(kNoDepth - 1) * Q.z.z), depth = sqrt(Q.z.z), now = sqrt(Q.z.z + more);
+    return (more / (depth * now * (depth + now))) * Q.z - (S(1.0) / now) * turned;
   }
 
   /// The same of a cable whose bodies are placed, and whose length is to be this.

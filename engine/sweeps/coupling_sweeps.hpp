@@ -133,6 +133,8 @@ class CouplingSweeps {
   void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta, Asked asked) {
     if (!empty()) rows_.find_gaps(placement, motion, delta, gives_way() ? Asked::rows : asked);
   }
+  /// After it, those of contacts, of bodies in the world at q^k that are displaced so.
+  void find_contact_gaps(const Field<S, 12>& world, const Field<S, 7>& displacement) { rows_.find_contact_gaps(world, displacement); }
 
   /// sweep(slots) of all bodies, leaves to root, in parts: at(closure) once all bodies beyond that where it closes have been met, and it has
   /// not.

@@ -1,7 +1,8 @@
 // Contacts of bodies with each other in a block of W instances: which of them have shapes that may touch in the next step. These are stepped alone
 // (engine/sweeps/body_contacts.hpp), the others together and as if there were no contact at all.
 //
-//   near      at the beginning of a step, each pair of shapes in all lanes at once: apart as balls, or along the axes of the boxes around them;
+//   near      at the beginning of a step, each pair of shapes in all lanes at once: apart as balls, or along the axes of the boxes around them, from
+//             a plane along its normal, from heights above the highest;
 //             what is left, lane by lane, as a step alone looks at it
 //   end       of the lanes that were stepped together: nothing was borne, and shapes moved from where near saw them
 //
@@ -18,7 +19,7 @@
 #include "engine/effects/effect_plan.hpp"
 #include "engine/solve/block_stepper.hpp"
 #include "engine/sweeps/body_contacts.hpp"
-#include "kernels/collision/convex_pair.hpp"
+#include "kernels/collision/height_contacts.hpp"
 #include "kernels/tree/world_placement_down.hpp"
 #include "kernels/values/lanes_of.hpp"
 
@@ -38,6 +39,8 @@ class LaneContacts {
       const ConvexShape& shape = body.shape;
       Shape& one = shapes_.emplace_back();
       one.slot = body.slot;
+      one.endless = is_endless(shape.kind);
+      if (shape.heights) one.top = *std::ranges::max_element(shape.heights->heights);
       one.reach = core_reach(shape) + shape.radius;
       one.half = half_edges(shape);
       one.in_body = body.pose;
@@ -55,9 +58,10 @@ class LaneContacts {
       const Pack margin = gap_looked_at(shapes_[a].reach, shapes_[b].reach, shapes_[a].moved, shapes_[b].moved);
       for (Lanes left = alive & ~found & maybe(shapes_[a], shapes_[b], margin); left != 0; left &= left - 1) {
         const int l = std::countr_zero(left);
-        const ContactPatch patch = contact_patch(contact_->shapes[a].shape, pose_of(shapes_[a], l), contact_->shapes[b].shape,
-                                                 pose_of(shapes_[b], l), static_cast<double>(L::lane(margin, l)));
-        if (patch.count > 0) found |= Lanes{1} << l;
+        if (are_near(contact_->shapes[a].shape, pose_of(shapes_[a], l), contact_->shapes[b].shape, pose_of(shapes_[b], l),
+                     static_cast<double>(L::lane(margin, l)))) {
+          found |= Lanes{1} << l;
+        }
       }
     }
     return found;
@@ -102,6 +106,8 @@ class LaneContacts {
  private:
   struct Shape {
     Index slot;
+    bool endless;                // a plane, or heights
+    double top = 0;              // how high it goes along its z, where it is one of these [m]
     double reach;                // from its middle [m]
     std::array<double, 3> half;  // of a box around it, in its own axes [m]
     Pose in_body;
@@ -119,7 +125,9 @@ class LaneContacts {
   static std::array<double, 3> half_edges(const ConvexShape& shape) {
     std::array<double, 3> half{};
     switch (shape.kind) {
-      case ConvexKind::point: break;
+      case ConvexKind::point:
+      case ConvexKind::plane:
+      case ConvexKind::heights: break;
       case ConvexKind::segment: half = {0, 0, shape.half[2]}; break;
       case ConvexKind::cylinder: half = {shape.half[0], shape.half[0], shape.half[2]}; break;
       case ConvexKind::box:
@@ -151,6 +159,8 @@ class LaneContacts {
   /// Lanes in which the boxes around two shapes are not seen to be farther apart than this.
   static Lanes maybe(const Shape& a, const Shape& b, const Pack& margin) {
     using std::abs;
+    if (a.endless) return maybe_over(a, b, margin);
+    if (b.endless) return maybe_over(b, a, margin);
     const Vec3<Pack> apart = b.placed.p - a.placed.p;
     const Pack reach = number(a.reach + b.reach) + margin;
     const Lanes balls = ~L::bits(dot(apart, apart) > reach * reach);
@@ -172,6 +182,14 @@ class LaneContacts {
                               L::bits(abs(in_a.z) > of_a_z + margin) | L::bits(abs(in_b.x) > of_b[0] + margin) |
                               L::bits(abs(in_b.y) > of_b[1] + margin) | L::bits(abs(in_b.z) > of_b[2] + margin);
     return balls & ~apart_along;
+  }
+
+  /// The same of what has no end and the box around a shape.
+  static Lanes maybe_over(const Shape& plane, const Shape& shape, const Pack& margin) {
+    using std::abs;
+    const Vec3<Pack> n{plane.placed.R.x.z, plane.placed.R.y.z, plane.placed.R.z.z}, along = transpose_times(shape.placed.R, n);
+    const Pack below = number(shape.half[0]) * abs(along.x) + number(shape.half[1]) * abs(along.y) + number(shape.half[2]) * abs(along.z);
+    return ~L::bits(dot(n, shape.placed.p - plane.placed.p) > below + number(plane.top) + margin);
   }
 
   static Pose pose_of(const Shape& shape, int l) {

@@ -85,6 +85,7 @@ Evaluated<double> TreeSweeps<kEffects>::evaluate_motions(StepReport& report, Pas
   take_multipliers();
   now.scale = now.energy;
   couplings_->find_gaps(work_.placement, work_.motion, work_.delta, factor == Factor::fresh ? Asked::rows : Asked::gaps);
+  if (contacts_) couplings_->find_contact_gaps(pose_, work_.displacement);
   act(now);
   pass_up(now, factor);
   return now;
@@ -171,6 +172,7 @@ void TreeSweeps<kEffects>::factor_again(Evaluated<double>& now, StepReport& repo
   if (!strategy_.one_pass) {
     if (!couplings_->empty()) couplings_->add_push(work_.residual);
     couplings_->find_gaps(work_.placement, work_.motion, work_.delta, Asked::rows);
+    if (contacts_) couplings_->find_contact_gaps(pose_, work_.displacement);
     factor();
     now.norm = pass_residual();
     return;

@@ -167,7 +167,7 @@ class TreeSweeps {
   /// Whether some coupling does.
   bool gives_way() const { return couplings_->gives_way(); }
   /// Contacts of bodies with each other, where a scene has any: of the step solved last, of h, before it arrives; before: displacement of
-  /// the step before; book(slot, what they took [J]).
+  /// the step before; book(slot, what they took [J], and what they may give to push bodies out of each other [J]).
   template <class Book>
   void end_contacts(double h, const Field<double>& before, const Book& book) {
     if (contacts_) contacts_->keep(h, *couplings_, before, work_.delta, book);

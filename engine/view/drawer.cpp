@@ -77,6 +77,9 @@ bool Drawer::add(const BodyShape& shape, Layer layer, const Colour& colour) {
     case ShapeKind::sphere: add(Solid::sphere, seen, pose, Vector3d::Constant(size[0])); break;
     case ShapeKind::box: add(Solid::box, seen, pose, {size[0], size[1], size[2]}); break;
     case ShapeKind::cylinder: add(Solid::cylinder, seen, pose, {size[0], size[0], size[1]}); break;
+    case ShapeKind::ellipsoid: add(Solid::sphere, seen, pose, {size[0], size[1], size[2]}); break;
+    case ShapeKind::plane:
+    case ShapeKind::heights: break;
     case ShapeKind::capsule:
       if (size[1] > 0) add(Solid::cylinder, seen, pose, {size[0], size[0], size[1]});
       for (const double end : {-size[1] / 2, size[1] / 2}) {

@@ -37,7 +37,7 @@ class Drawer {
   void add(Solid solid, const Seen& seen, const Isometry& pose, const Eigen::Vector3d& scale);
   /// A mesh that nothing else shows.
   void add(TriangleMesh mesh, const Seen& seen, const Isometry& pose);
-  /// A shape as its kind asks for. A file with colours has these in the visual layer. False where its file cannot be drawn.
+  /// A shape as its kind asks for. A file with colours has these in the visual layer. False where its file cannot be drawn. Not of a plane and of heights.
   bool add(const BodyShape& shape, Layer layer, const Colour& colour);
 
   /// Tells of the file of a shape that cannot be drawn, unless that was done; `instead`: what is drawn in its place.

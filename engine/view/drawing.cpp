@@ -51,7 +51,10 @@ class Picture {
       group_of_[at(i)] = group_of(model.names.body[at(i)], i);
     }
     for (const std::vector<BodyShape>* shapes : {&model.welded.shapes, &model.shapes}) {
-      for (const BodyShape& shape : *shapes) note(shape, shapes_on_, Looks::shapes);
+      for (const BodyShape& shape : *shapes) {
+        if (shape.shape.kind == ShapeKind::plane || shape.shape.kind == ShapeKind::heights) endless_.push_back(&shape);
+        else note(shape, shapes_on_, Looks::shapes);
+      }
     }
     for (const std::vector<BodyVisual>* visuals : {&model.welded.visuals, &model.visuals}) {
       for (const BodyVisual& visual : *visuals) note(visual, visuals_on_, Looks::visuals);
@@ -72,6 +75,7 @@ class Picture {
       if (slot > 0) draw_inertia(slot, Layer::inertia, kInertia);
     }
     if (effects.ground) draw_ground(*effects.ground);
+    for (const BodyShape* shape : endless_) draw_endless(*shape);
     return drawer_.result();
   }
 
@@ -208,7 +212,8 @@ class Picture {
     }
   }
 
-  void draw_ground(const Ground& ground) {
+  /// How far what has no end is drawn [m].
+  double ground_reach() const {
     std::vector<double> reach(slots_, 0);
     double farthest = kLeastReach;
     for (Index i = 1; i < model_.tree.shape.slots; ++i) {
@@ -217,9 +222,26 @@ class Picture {
                      Vector3d(constants.tree_placement(i, 9), constants.tree_placement(i, 10), constants.tree_placement(i, 11)).norm();
       farthest = std::max(farthest, reach[at(i)]);
     }
-    GroundMesh mesh = ground_mesh(ground, kGroundReach * farthest);
+    return kGroundReach * farthest;
+  }
+
+  void draw_ground(const Ground& ground) {
+    GroundMesh mesh = ground_mesh(ground, ground_reach());
     if (mesh.step > 1) drawer_.tell(fmt::format("the terrain is drawn by one in {} of its points along x and y", mesh.step));
     drawer_.add(std::move(mesh.mesh), {"ground", 0, Layer::ground, kGround}, isometry(mesh.pose));
+  }
+
+  /// A plane about its place that is nearest to the world's origin, heights where they are.
+  void draw_endless(const BodyShape& shape) {
+    Ground ground;
+    const std::array<double, 9>& R = shape.pose.rotation;
+    const std::array<double, 3>& p = shape.pose.shift;
+    ground.normal = {R[2], R[5], R[8]};
+    ground.height = R[2] * p[0] + R[5] * p[1] + R[8] * p[2];
+    if (shape.shape.heights) ground.terrain = *shape.shape.heights;
+    GroundMesh mesh = ground_mesh(ground, ground_reach());
+    if (mesh.step > 1) drawer_.tell(fmt::format("{} is drawn by one in {} of its points along x and y", shape.link, mesh.step));
+    drawer_.add(std::move(mesh.mesh), {shape.link, 0, Layer::ground, kGround}, isometry(shape.shape.heights ? shape.pose : mesh.pose));
   }
 
   const Model& model_;
@@ -229,7 +251,8 @@ class Picture {
   std::vector<std::size_t> group_of_;  // [slots] of the body; none of slot 0
   std::vector<Looks> looks_;           // [groups]
   std::map<std::pair<Index, std::string>, std::size_t> group_called_;
-  std::vector<std::vector<const BodyShape*>> shapes_on_;    // [slots]
+  std::vector<std::vector<const BodyShape*>> shapes_on_;    // [slots]; not those without end
+  std::vector<const BodyShape*> endless_;
   std::vector<std::vector<const BodyVisual*>> visuals_on_;  // [slots]
   std::vector<bool> shown_;  // [slots] something of it is in the visual layer
 };

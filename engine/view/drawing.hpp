@@ -6,9 +6,9 @@
 //   layer      parts
 //   visual     the <visual> elements of a URDF with their colours; of a tree of bodies, or a model in it, that has none its collision
 //              shapes; where it has none of these either a rod from each joint to those behind it, as thick as the body's mass tells
-//   collision  the shapes that touch the ground
+//   collision  the shapes that touch the ground and each other
 //   inertia    of each body with mass the box of even density that has its mass and inertia
-//   ground     the plane or terrain of a scene, on slot 0, as large as the model can reach
+//   ground     the plane or terrain of a scene, and planes and heights that stand in the world, on slot 0, as large as the model can reach
 //
 // A colour in a mesh file counts before that of its <material>, as in RViz. Where a file cannot be drawn the link's collision shapes stand
 // in for it, or if they cannot be drawn either, and nothing else is seen of the body, the box of its inertia.

@@ -76,10 +76,10 @@ Separation point_from_box(const std::array<double, 3>& half, const Vec3<double>&
 }
 
 Separation point_from_cylinder(const std::array<double, 3>& half, const Vec3<double>& p) {
-  const double rho = std::hypot(p.x, p.y), out = rho - half[0], above = std::abs(p.z) - half[2];
+  const double rho = std::sqrt(p.x * p.x + p.y * p.y), out = rho - half[0], above = std::abs(p.z) - half[2];
   const Vec3<double> radial = rho > 0 ? Vec3<double>{p.x / rho, p.y / rho, 0} : Vec3<double>{1, 0, 0}, axial{0, 0, std::copysign(1.0, p.z)};
   if (out > 0 && above > 0) {
-    const double distance = std::hypot(out, above);
+    const double distance = std::sqrt(out * out + above * above);
     return {(out / distance) * radial + (above / distance) * axial, distance, false};
   }
   return out > above ? Separation{radial, out, false} : Separation{axial, above, false};
@@ -123,9 +123,39 @@ Separation between_cores(const PlacedConvex& a, const PlacedConvex& b, double si
   return separation(a, b, size, margin);
 }
 
+/// The half space n.x <= offset, seen from the shape's origin, as A.
+ContactPatch half_space_patch(const Vec3<double>& n, double offset, const ConvexShape& b, const Pose& pose_b, double margin) {
+  const PlacedConvex on_b{b, Mat3<double>::from(pose_b.rotation.data()), {0, 0, 0}};
+  ContactPatch patch;
+  patch.normal = n;
+  patch.distance = dot(n, support(on_b, -n)) - b.radius - offset;
+  if (patch.distance > margin) return patch;
+  plane_points(offset, on_b, core_reach(b) + std::abs(offset), margin, patch);
+  const Vec3<double> origin = Vec3<double>::from(pose_b.shift.data());
+  for (int k = 0; k < patch.count; ++k) patch.points[static_cast<std::size_t>(k)].place += origin;
+  return patch;
+}
+
+/// A shape of that kind as A.
+ContactPatch patch_of_plane(const Pose& pose, const ConvexShape& b, const Pose& pose_b, double margin) {
+  const Vec3<double> n{pose.rotation[2], pose.rotation[5], pose.rotation[8]};
+  return half_space_patch(n, dot(n, Vec3<double>::from(pose.shift.data()) - Vec3<double>::from(pose_b.shift.data())), b, pose_b, margin);
+}
+
+/// With both shapes in each other's place.
+ContactPatch swapped(ContactPatch patch) {
+  patch.normal = -patch.normal;
+  const auto end = patch.points.begin() + patch.count;
+  for (auto point = patch.points.begin(); point != end; ++point) point->feature = point->feature << 32 | point->feature >> 32;
+  std::sort(patch.points.begin(), end, [](const PatchPoint& x, const PatchPoint& y) { return x.feature < y.feature; });
+  return patch;
+}
+
 }  // namespace
 
 ContactPatch contact_patch(const ConvexShape& a, const Pose& pose_a, const ConvexShape& b, const Pose& pose_b, double margin) {
+  if (a.kind == ConvexKind::plane) return patch_of_plane(pose_a, b, pose_b, margin);
+  if (b.kind == ConvexKind::plane) return swapped(patch_of_plane(pose_b, a, pose_a, margin));
   const Vec3<double> origin = Vec3<double>::from(pose_a.shift.data());
   const PlacedConvex on_a{a, Mat3<double>::from(pose_a.rotation.data()), {0, 0, 0}};
   const PlacedConvex on_b{b, Mat3<double>::from(pose_b.rotation.data()), Vec3<double>::from(pose_b.shift.data()) - origin};
@@ -147,16 +177,7 @@ ContactPatch contact_patch(const ConvexShape& a, const Pose& pose_a, const Conve
 }
 
 ContactPatch plane_patch(const Vec3<double>& n, double offset, const ConvexShape& b, const Pose& pose_b, double margin) {
-  const Vec3<double> origin = Vec3<double>::from(pose_b.shift.data());
-  const PlacedConvex on_b{b, Mat3<double>::from(pose_b.rotation.data()), {0, 0, 0}};
-  const double below = offset - dot(n, origin);  // of the plane, seen from the shape
-  ContactPatch patch;
-  patch.normal = n;
-  patch.distance = dot(n, support(on_b, -n)) - b.radius - below;
-  if (patch.distance > margin) return patch;
-  plane_points(below, on_b, core_reach(b) + std::abs(below), margin, patch);
-  for (int k = 0; k < patch.count; ++k) patch.points[static_cast<std::size_t>(k)].place += origin;
-  return patch;
+  return half_space_patch(n, offset - dot(n, Vec3<double>::from(pose_b.shift.data())), b, pose_b, margin);
 }
 
 }  // namespace linden

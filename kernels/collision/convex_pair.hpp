@@ -6,7 +6,7 @@
 //   point, box or cylinder      nearest point of the surface in closed form
 //   segment or box, box         separating axes where they overlap (exact); GJK and polish where they are apart
 //   all else                    separation.hpp
-//   half space, any             support along its normal
+//   half space (plane), any     support along its normal
 //
 // The radii about cores are taken off the distance afterwards, so spheres, capsules and round edges stay exact as long as the cores are apart, and
 // are the cores' overlap and the radii where they are not.
@@ -26,7 +26,7 @@
 
 namespace linden {
 
-/// margin: patches are wanted up to this gap [m]; infinite for the distance whatever it is.
+/// margin: patches are wanted up to this gap [m]; infinite for the distance whatever it is. One of both at most is a plane.
 ContactPatch contact_patch(const ConvexShape& a, const Pose& pose_a, const ConvexShape& b, const Pose& pose_b, double margin);
 
 /// The half space n.x <= offset as A: normal n, of unit length.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace linden {
 namespace {
@@ -53,7 +54,7 @@ Vec3<double> local_support(const ConvexShape& shape, const Vec3<double>& n) {
     case ConvexKind::segment: return {0, 0, std::copysign(half[2], n.z)};
     case ConvexKind::box: return {std::copysign(half[0], n.x), std::copysign(half[1], n.y), std::copysign(half[2], n.z)};
     case ConvexKind::cylinder: {
-      const double rho = std::hypot(n.x, n.y), z = std::copysign(half[2], n.z);
+      const double rho = std::sqrt(n.x * n.x + n.y * n.y), z = std::copysign(half[2], n.z);
       if (rho == 0) return {0, 0, z};
       return {half[0] * (n.x / rho), half[0] * (n.y / rho), z};
     }
@@ -64,6 +65,8 @@ Vec3<double> local_support(const ConvexShape& shape, const Vec3<double>& n) {
       return {half[0] * (a.x / h), half[1] * (a.y / h), half[2] * (a.z / h)};
     }
     case ConvexKind::hull: return Vec3<double>::from(shape.hull->points[farthest_point(*shape.hull, n)].data());
+    case ConvexKind::plane:
+    case ConvexKind::heights: break;
   }
   return {0, 0, 0};
 }
@@ -146,7 +149,7 @@ void box_feature(const PlacedConvex& convex, const Vec3<double>& n, Feature& fea
 void cylinder_feature(const PlacedConvex& convex, const Vec3<double>& n, Feature& feature) {
   const double radius = convex.shape.half[0], half = convex.shape.half[2];
   const Vec3<double> axis = column_of(convex.R, 2);
-  const double rho = std::hypot(n.x, n.y);
+  const double rho = std::sqrt(n.x * n.x + n.y * n.y);
   const Vec3<double> out = rho > 1e-9 ? convex.R * Vec3<double>{n.x / rho, n.y / rho, 0} : column_of(convex.R, 0);
   const bool up = n.z >= 0;
   const Vec3<double> end = convex.p + (up ? half : -half) * axis;
@@ -235,7 +238,7 @@ Vec3<double> bend(const PlacedConvex& convex, const Vec3<double>& n, const Vec3<
   const auto& half = convex.shape.half;
   if (convex.shape.kind == ConvexKind::cylinder) {
     const Vec3<double> m = transpose_times(convex.R, n), u = transpose_times(convex.R, t);
-    const double rho = std::hypot(m.x, m.y);
+    const double rho = std::sqrt(m.x * m.x + m.y * m.y);
     if (rho < 1e-100) return {0, 0, 0};
     const Vec3<double> across{-m.y / rho, m.x / rho, 0};
     return convex.R * ((half[0] / rho * dot(across, u)) * across);
@@ -261,6 +264,8 @@ double core_reach(const ConvexShape& shape) {
     case ConvexKind::cylinder: return std::sqrt(half[0] * half[0] + half[2] * half[2]);
     case ConvexKind::ellipsoid: return std::max({half[0], half[1], half[2]});
     case ConvexKind::hull: return shape.hull->reach;
+    case ConvexKind::plane:
+    case ConvexKind::heights: return std::numeric_limits<double>::infinity();
   }
   return 0;
 }
@@ -277,7 +282,9 @@ void kinks_near(const PlacedConvex& convex, const Vec3<double>& n, Kinks& kinks)
   constexpr double facing = 1 - 0.5 * kNear * kNear;
   switch (convex.shape.kind) {
     case ConvexKind::point:
-    case ConvexKind::ellipsoid: return;
+    case ConvexKind::ellipsoid:
+    case ConvexKind::plane:
+    case ConvexKind::heights: return;
     case ConvexKind::segment:
       if (std::abs(m.z) < kNear) add_edge(column_of(convex.R, 2));
       return;
@@ -324,6 +331,8 @@ void feature_along(const PlacedConvex& convex, const Vec3<double>& n, Feature& f
       if (feature.kind == Feature::Kind::line) feature.radius += convex.shape.radius;
       return;
     case ConvexKind::ellipsoid: set_point(feature, support(convex, n), kCornerId); return;
+    case ConvexKind::plane:
+    case ConvexKind::heights: return;
     case ConvexKind::hull:
       hull_feature(convex, m, feature);
       feature.radius = convex.shape.radius;
@@ -336,6 +345,13 @@ Bounds bounds_of(const ConvexShape& shape, const Pose& pose) {
   Bounds bounds;
   for (int k = 0; k < 3; ++k) {
     const auto at = static_cast<std::size_t>(k);
+    if (is_endless(shape.kind)) {
+      constexpr double endless = std::numeric_limits<double>::infinity();
+      const double along = shape.kind == ConvexKind::plane ? component_of(column_of(convex.R, 2), k) : 0;  // the others are 0 where it is 1
+      bounds.low[at] = along == -1 ? pose.shift[at] : -endless;
+      bounds.high[at] = along == 1 ? pose.shift[at] : endless;
+      continue;
+    }
     bounds.low[at] = component_of(support(convex, -axis_direction(k)), k) - shape.radius;
     bounds.high[at] = component_of(support(convex, axis_direction(k)), k) + shape.radius;
   }

@@ -14,6 +14,8 @@
 // h has *kinks* where x(n) jumps: great circles n _|_ e for edges e and for the axis of a cylinder, which its side makes; and points, where n is the
 // normal of a face or of a disc.
 //
+// A plane has none of these, it is as high as it is along its normal alone (convex_pair.hpp); nor have heights (height_contacts.hpp).
+//
 // cost    support: some 10 operations, of a hull one product a point, or a climb along edges where there are over kClimbFrom of them
 #pragma once
 
@@ -41,7 +43,7 @@ Vec3<double> bend(const PlacedConvex& convex, const Vec3<double>& n, const Vec3<
 /// Whether bend is 0 everywhere.
 inline bool is_polyhedron(const ConvexShape& shape) { return shape.kind != ConvexKind::cylinder && shape.kind != ConvexKind::ellipsoid; }
 
-/// Distance of the core's farthest point from its origin [m].
+/// Distance of the core's farthest point from its origin [m]; infinite of a plane and of heights.
 double core_reach(const ConvexShape& shape);
 
 /// Kinks of h within kNear of a direction n, of those whose edges and faces meet at the support point of n. What does not fit is left out.
@@ -72,7 +74,8 @@ struct Feature {
 };
 void feature_along(const PlacedConvex& convex, const Vec3<double>& n, Feature& feature);
 
-/// Box along the world's axes about a shape with its radius, at a pose.
+/// Box along the world's axes about a shape with its radius, at a pose. That of a plane has no end but where the plane lies square to an axis,
+/// that of heights has none: their highest is not looked for.
 struct Bounds {
   std::array<double, 3> low, high;  // [m]
 };

@@ -351,7 +351,7 @@ class Polish {
       if (!(ss + tt > 0 && det > 0)) break;
       const double gs = dot(w, s), gt = dot(w, t);
       const double xs = -(tt * gs - st * gt) / det, xt = -(ss * gt - st * gs) / det;
-      const double turn = std::hypot(xs, xt);
+      const double turn = std::sqrt(xs * xs + xt * xt);
       if (!(turn < 0.5)) break;
       const Vec3<double> next = n + xs * s + xt * t;
       n = next / length_of(next);

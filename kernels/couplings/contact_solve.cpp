@@ -9,11 +9,16 @@
 namespace linden {
 namespace {
 
-constexpr int kMostLoadRounds = 100, kMostNewtonSteps = 100, kMostTrials = 40;
+constexpr int kMostLoadRounds = 100, kMostNewtonSteps = 100, kMostTrials = 40, kMostOwnLoadSteps = 12;
 
-/// From this round on loads go half of the way: where friction is strong they would swing from one round to the next (of 1,000 random boxes on their
-/// corners, with coefficients up to 1, the loads of 43 never stood still, and of 1 so).
+/// From this round on loads go a part of the way, half of it at first: where friction is strong they would swing from one round to the next (of 1,000
+/// random boxes on their corners, with coefficients up to 1, the loads of 43 never stood still, and of 1 so). How far then follows from how the last
+/// two changes differ (Aitken): a rod that slides on an edge, at a coefficient of 2, swings with five times the change at two corners. Where changes
+/// grow and keep their way, as of Painleve's rod that jams, they go twice as far each time, until it sticks.
 constexpr int kCalmRound = 6;
+constexpr double kCalmShare = 0.5, kLeastShare = 1.0 / 64, kMostShare = 64;
+/// From this one on they may go farther than they would where changes fall slowly: two loads that one row shares among them.
+constexpr int kSlowRound = 20;
 
 /// Rounds end once loads change by less than this share of the largest; or than the second, where they hardly change less than in the round before:
 /// of what is stiff and stands on many places rounding leaves so much (a wall of 12 rigid bricks took 9 ms a step, and takes 2).
@@ -29,11 +34,12 @@ constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
 /// A factor serves as long as H has changed by less than this share.
 constexpr double kSameFalls = 1e-3;
 
-/// action(size), which is known to the compiler where it is that of a free body.
+/// action(width), which is known to the compiler where it is that of one free body or two.
 template <class Action>
-void with_size(std::size_t size, const Action& action) {
-  if (size == 6) return action(std::integral_constant<std::size_t, 6>());
-  action(size);
+void with_width(std::size_t width, const Action& action) {
+  if (width == 6) return action(std::integral_constant<std::size_t, 6>());
+  if (width == 12) return action(std::integral_constant<std::size_t, 12>());
+  action(width);
 }
 
 }  // namespace
@@ -42,18 +48,21 @@ ContactSolve::ContactSolve() = default;
 ContactSolve::~ContactSolve() = default;
 
 /// Impulses of contacts that open by these gaps, and how they fall.
-void ContactSolve::find_pushes(const Rows& rows, const Eigen::VectorXd& gaps) {
+void ContactSolve::find_pushes(const Rows& rows, const Eigen::VectorXd& gaps, Load load) {
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(rows.first[c]);
     const ContactLaw& law = rows.laws[c];
     const double depth = -(gaps[at + 2] + law.lift), s1 = gaps[at], s2 = gaps[at + 1], length = std::sqrt(s1 * s1 + s2 * s2);
     const bool slides = length > law.creep;
-    const double drag = law.friction * loads_[c] > 0 ? law.friction * loads_[c] / std::max(length, law.creep) : 0;
+    const double push = law.stiffness * std::max(depth, 0.0), fall = depth > 0 ? law.stiffness : 0;
+    const double borne = law.friction * (load == Load::own ? push : loads_[c]);
+    const double per_length = borne > 0 ? 1 / std::max(length, law.creep) : 0, drag = borne * per_length;
     pushes_[at] = -drag * s1;
     pushes_[at + 1] = -drag * s2;
-    pushes_[at + 2] = law.stiffness * std::max(depth, 0.0);
+    pushes_[at + 2] = push;
     const double d1 = slides ? s1 / length : 0, d2 = slides ? s2 / length : 0;
-    falls_[c] = {drag * (1 - d1 * d1), -drag * d1 * d2, drag * (1 - d2 * d2), depth > 0 ? law.stiffness : 0};
+    const double less = load == Load::own ? -law.friction * fall * per_length : 0;
+    falls_[c] = {drag * (1 - d1 * d1), -drag * d1 * d2, drag * (1 - d2 * d2), fall, less * s1, less * s2};
   }
 }
 
@@ -63,15 +72,19 @@ void ContactSolve::prepare(Product product) {
   FrontalSolve::Elements elements;
   contact_of_.clear();
   row_group_.clear();
-  first_number_.resize(product_.terms.size());
-  std::size_t contacts = 0, rows = 0, numbers = 0;
+  widths_.clear();
+  std::size_t contacts = 0, rows = 0, numbers = 0, unknowns = 0, widest = 0;
   any_linear_ = false;
   for (const Block& block : product_.blocks) {
+    Width width{.numbers = 0, .first_number = numbers, .first_unknown = unknowns};
     for (std::size_t t = block.first_term; t < block.last_term; ++t) {
       elements.groups.push_back(product_.terms[t].group);
-      first_number_[t] = numbers;
-      numbers += block.rows * groups[product_.terms[t].group].size;
+      width.numbers += groups[product_.terms[t].group].size;
     }
+    numbers += block.rows * width.numbers;
+    unknowns += width.numbers;
+    widest = std::max(widest, width.numbers);
+    widths_.push_back(width);
     contact_of_.push_back(contacts);
     row_group_.push_back(groups.size());
     if (block.touches) {
@@ -85,11 +98,21 @@ void ContactSolve::prepare(Product product) {
     rows = std::max(rows, block.first + block.rows);
   }
   frontal_.analyse(groups, elements);
+  unknowns_.clear();
+  for (const Block& block : product_.blocks) {
+    for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+      const std::size_t group = product_.terms[t].group;
+      for (std::size_t n = 0; n < groups[group].size; ++n) unknowns_.push_back(frontal_.first_of(group) + n);
+    }
+  }
+  gathered_.resize(widest);
+  places_.resize(widest);
   diagonal_.resize(frontal_.unknowns());
   motion_.resize(frontal_.unknowns());
-  for (Eigen::VectorXd* each : {&b_, &z_, &change_, &gaps_, &moved_, &tried_, &pushes_}) each->setZero(static_cast<Eigen::Index>(rows));
+  for (Eigen::VectorXd* each : {&b_, &z_, &change_, &gaps_, &moved_, &tried_, &left_, &pushes_}) each->setZero(static_cast<Eigen::Index>(rows));
   for (std::vector<Falls>* each : {&falls_, &factored_}) each->resize(contacts);
   loads_.resize(contacts);
+  changes_.resize(contacts);
   for (std::vector<double>* each : {&across_, &columns_}) each->resize(numbers);
   renew();
 }
@@ -97,11 +120,12 @@ void ContactSolve::prepare(Product product) {
 void ContactSolve::read() {
   if (is_read_) return;
   is_read_ = true;
-  for (const Block& block : product_.blocks) {
-    for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-      const Term& term = product_.terms[t];
-      std::size_t to = first_number_[t];
-      for (std::size_t j = 0; j < block.rows; ++j) {
+  for (std::size_t k = 0; k < product_.blocks.size(); ++k) {
+    const Block& block = product_.blocks[k];
+    std::size_t to = widths_[k].first_number;
+    for (std::size_t j = 0; j < block.rows; ++j) {
+      for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+        const Term& term = product_.terms[t];
         for (std::size_t n = 0; n < product_.groups[term.group].size; ++n, ++to) {
           across_[to] = term.across[n * term.number_stride + j * term.row_stride];
           columns_[to] = term.columns[n * term.number_stride + j * term.row_stride];
@@ -112,39 +136,55 @@ void ContactSolve::read() {
 }
 
 /// motion += X impulses, openings = Y motion, of a block's.
-void ContactSolve::move(const Block& block, const double* impulses, double* motion) const {
-  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const std::size_t group = product_.terms[t].group, size = product_.groups[group].size;
-    double* const to = motion + frontal_.first_of(group);
-    const double* column = &columns_[first_number_[t]];
-    with_size(size, [&](auto numbers) {
-      for (std::size_t j = 0; j < block.rows; ++j, column += numbers) {
-        for (std::size_t n = 0; n < numbers; ++n) to[n] += column[n] * impulses[j];
-      }
-    });
-  }
+void ContactSolve::move(std::size_t block, const double* impulses, double* motion) const {
+  const std::size_t rows = product_.blocks[block].rows;
+  const std::size_t* const at = &unknowns_[widths_[block].first_unknown];
+  const double* const column = &columns_[widths_[block].first_number];
+  with_width(widths_[block].numbers, [&](auto width) {
+    if (rows == 3) {
+      const double *const x1 = column, *const x2 = x1 + width, *const x3 = x2 + width;
+      const double i1 = impulses[0], i2 = impulses[1], i3 = impulses[2];
+      for (std::size_t n = 0; n < width; ++n) motion[at[n]] += x1[n] * i1 + x2[n] * i2 + x3[n] * i3;
+      return;
+    }
+    for (std::size_t j = 0; j < rows; ++j) {
+      for (std::size_t n = 0; n < width; ++n) motion[at[n]] += column[j * width + n] * impulses[j];
+    }
+  });
 }
-void ContactSolve::open(const Block& block, const double* motion, double* openings) const {
-  std::fill_n(openings, block.rows, 0.0);
-  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const std::size_t group = product_.terms[t].group, size = product_.groups[group].size;
-    const double* const from = motion + frontal_.first_of(group);
-    const double* row = &across_[first_number_[t]];
-    with_size(size, [&](auto numbers) {
-      for (std::size_t j = 0; j < block.rows; ++j, row += numbers) {
-        double sum = 0;
-        for (std::size_t n = 0; n < numbers; ++n) sum += row[n] * from[n];
-        openings[j] += sum;
+void ContactSolve::open(std::size_t block, const double* motion, double* openings) const {
+  const std::size_t rows = product_.blocks[block].rows;
+  const std::size_t* const at = &unknowns_[widths_[block].first_unknown];
+  const double* const row = &across_[widths_[block].first_number];
+  with_width(widths_[block].numbers, [&](auto width) {
+    if (rows == 3) {
+      const double *const y1 = row, *const y2 = y1 + width, *const y3 = y2 + width;
+      double o1 = 0, o2 = 0, o3 = 0;
+      for (std::size_t n = 0; n < width; ++n) {
+        const double moved = motion[at[n]];
+        o1 += y1[n] * moved;
+        o2 += y2[n] * moved;
+        o3 += y3[n] * moved;
       }
-    });
-  }
+      openings[0] = o1;
+      openings[1] = o2;
+      openings[2] = o3;
+      return;
+    }
+    for (std::size_t j = 0; j < rows; ++j) {
+      double sum = 0;
+      for (std::size_t n = 0; n < width; ++n) sum += row[j * width + n] * motion[at[n]];
+      openings[j] = sum;
+    }
+  });
 }
 
 /// openings = S impulses.
 void ContactSolve::multiply(const Eigen::VectorXd& impulses, Eigen::VectorXd& openings) {
   std::ranges::fill(motion_, 0.0);
-  for (const Block& block : product_.blocks) move(block, &impulses[static_cast<Eigen::Index>(block.first)], motion_.data());
-  for (const Block& block : product_.blocks) open(block, motion_.data(), &openings[static_cast<Eigen::Index>(block.first)]);
+  const auto first = [&](std::size_t block) { return static_cast<Eigen::Index>(product_.blocks[block].first); };
+  for (std::size_t k = 0; k < product_.blocks.size(); ++k) move(k, &impulses[first(k)], motion_.data());
+  for (std::size_t k = 0; k < product_.blocks.size(); ++k) open(k, motion_.data(), &openings[first(k)]);
 }
 
 bool ContactSolve::is_near(const Falls& factored, const Falls& now) const {
@@ -153,43 +193,48 @@ bool ContactSolve::is_near(const Falls& factored, const Falls& now) const {
   for (const std::size_t k : {0u, 1u, 2u}) {
     if (std::abs(factored[k] - now[k]) > kSameFalls * most) return false;
   }
+  for (const std::size_t k : {4u, 5u}) {
+    if (std::abs(factored[k] - now[k]) > kSameFalls * now[3]) return false;
+  }
   return true;
 }
 
 /// X H Y.
-void ContactSolve::add_contact(const Block& block, const Falls& falls, double* front, std::size_t stride, const std::size_t* at) const {
-  const auto& [h11, h12, h22, h33] = falls;
-  if (h11 == 0 && h22 == 0 && h33 == 0) return;
-  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const std::size_t size = product_.groups[product_.terms[t].group].size;
-    const double* const x = &columns_[first_number_[t]];
-    for (std::size_t n = 0; n < size; ++n) {
-      const double x1 = x[n], x2 = x[size + n], a1 = h11 * x1 + h12 * x2, a2 = h12 * x1 + h22 * x2, a3 = h33 * x[2 * size + n];
-      double* const row = front + (at[t - block.first_term] + n) * stride;
-      for (std::size_t u = block.first_term; u < block.last_term; ++u) {
-        const std::size_t width = product_.groups[product_.terms[u].group].size;
-        const double *const y1 = &across_[first_number_[u]], *const y2 = y1 + width, *const y3 = y2 + width;
-        double* const to = row + at[u - block.first_term];
-        with_size(width, [&](auto numbers) {
-          for (std::size_t m = 0; m < numbers; ++m) to[m] += a1 * y1[m] + a2 * y2[m] + a3 * y3[m];
-        });
-      }
+void ContactSolve::add_contact(std::size_t block, const Falls& falls, double* front, std::size_t stride, const std::size_t* at) {
+  if (falls[0] == 0 && falls[2] == 0 && falls[3] == 0) return;
+  find_places(product_.blocks[block], at);
+  with_width(widths_[block].numbers, [&](auto width) {
+    const auto& [h11, h12, h22, h33, h13, h23] = falls;
+    const double *const x1 = &columns_[widths_[block].first_number], *const x2 = x1 + width, *const x3 = x2 + width;
+    const double *const y1 = &across_[widths_[block].first_number], *const y2 = y1 + width, *const y3 = y2 + width;
+    for (std::size_t n = 0; n < width; ++n) {
+      const double a1 = h11 * x1[n] + h12 * x2[n], a2 = h12 * x1[n] + h22 * x2[n], a3 = h13 * x1[n] + h23 * x2[n] + h33 * x3[n];
+      for (std::size_t m = 0; m < width; ++m) gathered_[m] = a1 * y1[m] + a2 * y2[m] + a3 * y3[m];
+      double* const row = front + places_[n] * stride;
+      for (std::size_t m = 0; m < width; ++m) row[places_[m]] += gathered_[m];
     }
+  });
+}
+
+/// Of each number of a block, its place in a front where its groups begin at these.
+void ContactSolve::find_places(const Block& block, const std::size_t* at) {
+  std::size_t to = 0;
+  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
+    for (std::size_t n = 0; n < product_.groups[product_.terms[t].group].size; ++n) places_[to++] = at[t - block.first_term] + n;
   }
 }
 
 /// Rows that are held already stay where they are, and nothing feels them.
-void ContactSolve::add_linear(const Block& block, const Rows& rows, double* front, std::size_t stride, const std::size_t* at) const {
-  const std::size_t own = at[block.last_term - block.first_term];
-  for (std::size_t t = block.first_term; t < block.last_term; ++t) {
-    const std::size_t size = product_.groups[product_.terms[t].group].size;
-    for (std::size_t j = 0; j < block.rows; ++j) {
-      if (std::isinf(rows.yields[block.first + j])) continue;
-      for (std::size_t n = 0; n < size; ++n) {
-        const std::size_t number = at[t - block.first_term] + n, from = first_number_[t] + j * size + n;
-        front[number * stride + own + j] -= columns_[from];
-        front[(own + j) * stride + number] += across_[from];
-      }
+void ContactSolve::add_linear(std::size_t block, const Rows& rows, double* front, std::size_t stride, const std::size_t* at) {
+  const Block& its = product_.blocks[block];
+  find_places(its, at);
+  const std::size_t own = at[its.last_term - its.first_term], width = widths_[block].numbers;
+  for (std::size_t j = 0; j < its.rows; ++j) {
+    if (std::isinf(rows.yields[its.first + j])) continue;
+    const std::size_t from = widths_[block].first_number + j * width;
+    for (std::size_t n = 0; n < width; ++n) {
+      front[places_[n] * stride + own + j] -= columns_[from + n];
+      front[(own + j) * stride + places_[n]] += across_[from + n];
     }
   }
 }
@@ -208,8 +253,8 @@ void ContactSolve::factor(const Rows& rows) {
   }
   frontal_.factor(diagonal_, [this, &rows](std::size_t k, double* front, std::size_t stride, const std::size_t* at) {
     const Block& block = product_.blocks[k];
-    if (block.touches) return add_contact(block, factored_[contact_of_[k]], front, stride, at);
-    add_linear(block, rows, front, stride, at);
+    if (block.touches) return add_contact(k, factored_[contact_of_[k]], front, stride, at);
+    add_linear(k, rows, front, stride, at);
   });
 }
 
@@ -233,7 +278,7 @@ void ContactSolve::correct(const Rows& rows) {
   for (std::size_t k = 0; k < product_.blocks.size(); ++k) {
     const Block& block = product_.blocks[k];
     if (block.touches) {
-      move(block, &change_[static_cast<Eigen::Index>(block.first)], motion_.data());
+      move(k, &change_[static_cast<Eigen::Index>(block.first)], motion_.data());
       continue;
     }
     for (std::size_t j = 0; j < block.rows; ++j) {
@@ -250,12 +295,12 @@ void ContactSolve::correct(const Rows& rows) {
       std::copy_n(&motion_[frontal_.first_of(row_group_[k])], block.rows, change);
       continue;
     }
-    const auto& [h11, h12, h22, h33] = factored_[contact_of_[k]];
+    const auto& [h11, h12, h22, h33, h13, h23] = factored_[contact_of_[k]];
     if (h11 == 0 && h22 == 0 && h33 == 0) continue;
     double opens[3];
-    open(block, motion_.data(), opens);
-    change[0] -= h11 * opens[0] + h12 * opens[1];
-    change[1] -= h12 * opens[0] + h22 * opens[1];
+    open(k, motion_.data(), opens);
+    change[0] -= h11 * opens[0] + h12 * opens[1] + h13 * opens[2];
+    change[1] -= h12 * opens[0] + h22 * opens[1] + h23 * opens[2];
     change[2] -= h33 * opens[2];
   }
   multiply(change_, moved_);
@@ -276,7 +321,7 @@ double ContactSolve::slope(const Rows& rows, double share) const {
 double ContactSolve::share_of_correction(const Rows& rows, double slope_at_begin) {
   const auto slope_at = [&](double share) {
     tried_ = gaps_ + share * moved_;
-    find_pushes(rows, tried_);
+    find_pushes(rows, tried_, Load::of_last_round);
     return slope(rows, share);
   };
   double low = 0, high = 1, at_low = slope_at_begin, at_high = slope_at(1);
@@ -315,6 +360,52 @@ void ContactSolve::solve_linear_rows(const Rows& rows) {
   z_ += change_;
 }
 
+/// From z_ and its gaps_; false, and z_ as it was, where corrections do not become ever smaller.
+bool ContactSolve::solve_with_own_loads(const Rows& rows) {
+  left_ = z_;
+  double size_before = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kMostOwnLoadSteps; ++k) {
+    find_pushes(rows, gaps_, Load::own);
+    correct(rows);
+    ++corrections_;
+    double most = 0, size = 0;
+    for (const std::size_t first : rows.first) {
+      for (std::size_t j = first; j < first + 3; ++j) size = std::max(size, std::abs(change_[static_cast<Eigen::Index>(j)]));
+      most = std::max(most, rows.multipliers[first + 2] + z_[static_cast<Eigen::Index>(first + 2)]);
+    }
+    const bool rounded = size <= kRoundedLoad * most && size > kHardlyLess * size_before;
+    if (!rounded && !(size < size_before)) break;
+    z_ += change_;
+    gaps_ += moved_;
+    if (rounded || size <= kSteadyLoad * most) return true;
+    size_before = size;
+  }
+  z_ = left_;
+  return false;
+}
+
+/// After a round. Returns the largest load, and the largest change of one that the round asks for.
+std::array<double, 2> ContactSolve::renew_loads(const Rows& rows) {
+  double most = 0, changed = 0, along = 0, square = 0;
+  for (std::size_t c = 0; c < rows.first.size(); ++c) {
+    const double load = std::max(0.0, rows.multipliers[rows.first[c] + 2] + z_[static_cast<Eigen::Index>(rows.first[c] + 2)]);
+    const double change = load - loads_[c], differs = change - changes_[c];
+    most = std::max(most, load);
+    changed = std::max(changed, std::abs(change));
+    along += changes_[c] * differs;
+    square += differs * differs;
+    changes_[c] = change;
+  }
+  if (rounds_ < kCalmRound) share_of_change_ = 1;
+  if (rounds_ == kCalmRound) share_of_change_ = kCalmShare;
+  if (rounds_ > kCalmRound) {
+    const double most_share = rounds_ > kSlowRound ? kMostShare : 1;
+    share_of_change_ = along < 0 ? std::clamp(-share_of_change_ * along / square, kLeastShare, most_share) : std::min(2 * share_of_change_, kMostShare);
+  }
+  for (std::size_t c = 0; c < rows.first.size(); ++c) loads_[c] += share_of_change_ * changes_[c];
+  return {most, changed};
+}
+
 void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
   read();
   std::ranges::copy(right_side, b_.begin());
@@ -326,12 +417,13 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
   factors_ = 0;
   solve_linear_rows(rows);
   corrections_ = 0;
+  const bool rubs = std::ranges::any_of(rows.laws, [](const ContactLaw& law) { return law.friction > 0; });
   double enough = kFirstDone, changed_before = std::numeric_limits<double>::infinity();
   for (rounds_ = 1; rounds_ <= kMostLoadRounds; ++rounds_) {
     multiply(z_, gaps_);
     gaps_ -= b_;
     for (int k = 0; k < kMostNewtonSteps; ++k) {
-      find_pushes(rows, gaps_);
+      find_pushes(rows, gaps_, Load::of_last_round);
       correct(rows);
       ++corrections_;
       double work = 0;
@@ -348,19 +440,11 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
       gaps_ += share * moved_;
       if (done) break;
     }
-    double most = 0, changed = 0;
-    bool rubs = false;
-    for (std::size_t c = 0; c < rows.first.size(); ++c) {
-      double load = std::max(0.0, rows.multipliers[rows.first[c] + 2] + z_[static_cast<Eigen::Index>(rows.first[c] + 2)]);
-      rubs = rubs || rows.laws[c].friction > 0;
-      most = std::max(most, load);
-      changed = std::max(changed, std::abs(load - loads_[c]));
-      if (rounds_ >= kCalmRound) load = 0.5 * (load + loads_[c]);
-      loads_[c] = load;
-    }
+    const auto [most, changed] = renew_loads(rows);
     const bool rounded = changed <= kRoundedLoad * most && changed > kHardlyLess * changed_before;
     if (enough <= kDone && (!rubs || changed <= kSteadyLoad * most || rounded)) break;
     changed_before = changed;
+    if (rubs && solve_with_own_loads(rows)) break;
     const double change = rubs && most > 0 ? kShareOfChange * changed / most : 0;
     enough = std::clamp(change * change, kDone, kFirstDone);
   }

@@ -109,7 +109,7 @@ auto update_limits(Limits<S>& limits, const Field<S>& residual, const Mask& sett
   return changed;
 }
 
-/// In which instances a joint that bounces was stopped by its limit instead: by a solution in which it did not rest there before.
+/// In which instances a joint that bounces ends a step on its limit where it did not rest before: stopped by it, or come there by itself.
 template <class S, class Mask>
 auto stopped_bounces(const Limits<S>& limits, const Field<Index>& q_row, const Field<S>& q, const Field<S>& delta, const Field<S>& before,
                      const Mask& known) {
@@ -123,7 +123,7 @@ auto stopped_bounces(const Limits<S>& limits, const Field<Index>& q_row, const F
     const S to = q(q_row(limit.row)) + d;
     const auto at_limit = as<S>(limit.upper) - to <= slack || to - as<S>(limit.lower) <= slack;  // not only at its limit of velocity
     const auto rests = known && abs(before(limit.row)) <= slack && abs(d) <= slack;
-    stopped = stopped || (limits.mode(k) != zero && at_limit && !rests);
+    stopped = stopped || (at_limit && !rests);
   }
   return stopped;
 }

@@ -148,10 +148,19 @@ class Checker {
     }
     for (const ConvexBody& shape : contact.shapes) {
       if (shape.slot != 0) require_slot(shape.slot);
+      if (shape.slot != 0 && is_endless(shape.shape.kind)) {
+        fail("a plane or heights are on a body that moves", "one fixed to the world", "make it a box");
+      }
       not_negative("the radius of a shape", shape.shape.radius);
       for (const double half : shape.shape.half) not_negative("half an edge of a shape", half);
       if ((shape.shape.kind == ConvexKind::hull) != (shape.shape.hull != nullptr)) fail("a shape has a hull and is none, or the other way round", "one of both", "make it by convex_of");
       if (shape.shape.hull) check_hull(*shape.shape.hull);
+      if ((shape.shape.kind == ConvexKind::heights) != (shape.shape.heights != nullptr)) {
+        fail("a shape has heights and is none, or the other way round", "one of both", "make it by convex_of");
+      }
+      if (shape.shape.heights && !is_whole(*shape.shape.heights)) {
+        fail("heights of a shape are no grid", "columns x rows finite numbers, two of each or more, at spacings above zero", "correct them");
+      }
     }
     if (!std::ranges::is_sorted(contact.shapes, {}, &ConvexBody::slot)) fail("its shapes are in no order", "bodies in ascending order", "sort them by slot");
     for (const auto& [a, b] : contact.pairs) {

@@ -34,6 +34,7 @@ struct PairContact {
                                      .account = Account::taken,
                                      .stores = true,
                                      .has_states = true,
+                                     .strikes = true,
                                      .sudden = "contact"};
 };
 

@@ -33,6 +33,7 @@ struct EffectFacts {
   bool single = false;             // no two entries on one joint
   bool on_balls = false;           // beside joints about or along one axis ball joints can have it, an entry a row
   bool has_states = false;         // of which one holds is settled within the solve; an entry's settles() may say: not for this one
+  bool strikes = false;            // stops within a step what meets it: what it takes of a blow depends on what else struck in that step
   std::string_view sudden = {};    // what of it jumps, in words; empty where its force is a continuous function of positions and velocities;
                                    // an entry's jumps() may say: not of this one
 };

@@ -22,6 +22,7 @@ struct JointLimit {
                                      .account = Account::taken,
                                      .single = true,
                                      .has_states = true,
+                                     .strikes = true,
                                      .sudden = "limits"};
 };
 

@@ -78,6 +78,10 @@ void check_inertia(const LinkSpec& link, const std::string& source, std::vector<
 }
 
 void check_shape(const LinkShape& shape, const char* what, const LinkSpec& link, const std::string& source) {
+  if (is_of_world_alone(shape.shape.kind)) {
+    fail(source, fmt::format("link {}: a {} is an ellipsoid, a plane or heights, which stand in the world alone; expected another kind; add it by with_world",
+                             quoted(link.name), what));
+  }
   const bool mirrors = shape.shape.kind == ShapeKind::mesh;
   for (const double size : shape.shape.size) {
     if (!std::isfinite(size) || (size < 0 && !mirrors) || !isometry(shape.pose).matrix().allFinite()) {

@@ -6,6 +6,7 @@
 // (models/shapes/collision_pairs.hpp).
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,10 @@
 #include "layout/support/input_error.hpp"
 
 namespace linden {
+
+/// Where a plane is (ShapeKind::plane) that lies square to a normal, of any length, as far along it from the origin as its height [m]. Throws
+/// InputError for a normal that is zero, or numbers that are not finite.
+Pose plane_pose(const std::array<double, 3>& normal, double height);
 
 struct WorldShape {
   std::string name;      // without "world/"

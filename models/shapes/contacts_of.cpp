@@ -52,6 +52,9 @@ class Touch {
         add_block(body, Vector3d::Zero(), {0, 0, size[1]}, size[0]);
         break;
       case ShapeKind::mesh: add_mesh(body); break;
+      case ShapeKind::ellipsoid:
+      case ShapeKind::plane:
+      case ShapeKind::heights: break;  // the world's own do not touch the ground
     }
   }
 

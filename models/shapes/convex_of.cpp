@@ -83,6 +83,15 @@ class ConvexShapes {
         shape.half = {0, 0, size[1] / 2};
         shape.radius = size[0];
         break;
+      case ShapeKind::ellipsoid:
+        shape.kind = ConvexKind::ellipsoid;
+        shape.half = size;
+        break;
+      case ShapeKind::plane: shape.kind = ConvexKind::plane; break;
+      case ShapeKind::heights:
+        shape.kind = ConvexKind::heights;
+        shape.heights = body.shape.heights;
+        break;
       case ShapeKind::mesh: {
         const auto [read, first_time] = read_.try_emplace({body.shape.mesh, size});
         if (first_time) read->second = read_hull(body.shape.mesh, source_, {size[0], size[1], size[2]});

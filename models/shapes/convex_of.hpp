@@ -2,7 +2,7 @@
 // The convex shapes that a model's links touch each other with, from the collision shapes of its file (layout/convex.hpp).
 //
 //   shape                   becomes
-//   sphere, box, cylinder   itself
+//   sphere, box, cylinder   itself; an ellipsoid, a plane and heights likewise
 //   capsule                 a segment with a radius
 //   mesh                    the convex hull of its points: what is hollow or bent inward is filled
 #pragma once

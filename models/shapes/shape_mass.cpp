@@ -42,7 +42,10 @@ LinkInertia in_own_frame(const CollisionShape& shape, double density) {
       return turned(m + ends, m * r * r / 2 + 0.4 * ends * r * r,
                     m * (3 * r * r + l * l) / 12 + ends * (0.4 * r * r + l * l / 4 + 0.375 * l * r));
     }
-    case ShapeKind::mesh: break;
+    case ShapeKind::mesh:
+    case ShapeKind::ellipsoid:
+    case ShapeKind::plane:
+    case ShapeKind::heights: break;  // of links there are none of the last three
   }
   return {};
 }

@@ -104,7 +104,7 @@ class Solve {
     const MatrixXd A = reference::dense_jacobian(model_, work_.placement, work_.motion);
     const Index n = model_.tree.shape.velocities, m = static_cast<Index>(rows.count());
     MatrixXd whole = MatrixXd::Zero(n + m, n + m);
-    VectorXd right_side(n + m);
+    VectorXd right_side = VectorXd::Zero(n + m);
     whole.topLeftCorner(n, n) = A;
     std::vector<double> unit(static_cast<std::size_t>(m), 0.0);
     Field<double> column;

@@ -73,18 +73,20 @@ TEST_CASE("inspect counts what a factor takes where loops close, and notes the c
 TEST_CASE("inspect lists shapes of the world, and what contact costs by how much touches", "[inspect]") {
   const Shell shell;
   shell.write("s.yaml", "model: boxes:2\nduration: 0.05\nworld:\n  - {type: sphere, name: knob, radius: 0.1, position: [3, 0, 1]}\n"
+                        "  - {type: plane, name: wall, normal: [-1, 0, 0], height: -9}\n  - {type: ellipsoid, name: egg, radii: [1, 2, 3], position: [9, 9, 9]}\n"
                         "effects: {gravity: [0, 0, -9.81], contact: {stiffness: 1e8, except: [[box2, world/knob]]}}\n");
   const Outcome outcome = shell.linden("inspect s.yaml --json s.json");
   REQUIRE(outcome.exit_code == 0);
   CHECK_THAT(outcome.out, Contains("world/knob: sphere, radius 0.1 m, at 3 0 1") && Contains("world/floor: box"));
-  CHECK_THAT(outcome.out, Contains("contact, beside these sweeps, over 50 steps") && Contains("which of 4 pairs of shapes are near") && Contains("5 to 8"));
+  CHECK_THAT(outcome.out, Contains("world/wall: plane, normal -1 0 0, at 9 0 0") && Contains("world/egg: ellipsoid, semi-axes 1, 2 and 3 m, at 9 9 9"));
+  CHECK_THAT(outcome.out, Contains("contact, beside these sweeps, over 50 steps") && Contains("which of 8 pairs of shapes are near") && Contains("5 to 8"));
   const nlohmann::json facts = nlohmann::json::parse(text_of(shell / "s.json"));
   CHECK(facts.at("merged_links").empty());
-  REQUIRE(facts.at("world").size() == 2);
+  REQUIRE(facts.at("world").size() == 4);
   CHECK(facts.at("world")[1].at("link") == "world/knob");
   CHECK(facts.at("world")[1].at("position") == nlohmann::json{3, 0, 1});
   const nlohmann::json& contact = facts.at("contact");
-  CHECK(contact.at("pairs") == 4);
+  CHECK(contact.at("pairs") == 8);
   CHECK(contact.at("places_near") == 8);
   CHECK(contact.at("find_us") > 0);
   // four corners of each box press from the first step on

@@ -58,6 +58,50 @@ TEST_CASE("a watch goes on from all that another one knows") {
   for (std::size_t k = 0; k < 2; ++k) CHECK(describe(other.gifts()[k]) == describe(one.gifts()[k]));
 }
 
+TEST_CASE("what strikes in one step shares a blow, and only what all of it gives is a gift") {
+  const Model model = chain(3);
+  const auto blow = [](double limits, double ground, double friction) {
+    EffectAccount account = step(friction, ground);
+    account.work.of<JointLimit>() = limits;
+    account.least[kListOf<JointLimit>].see(0, limits);
+    return account;
+  };
+  PassiveWatch together(model, Effects{}), apart(model, Effects{}), rubbing(model, Effects{});
+  together.add(blow(-0.8, 1.0, 0), 0.001);  // a foot lands, and its joint is thrown on its limit
+  CHECK(together.gifts().empty());
+  together.add(blow(-0.8, 0.5, 0), 0.002);
+  REQUIRE(together.gifts().size() == 1);
+  CHECK(together.gifts().front().effect == "limits");
+  CHECK(together.gifts().front().amount == Approx(0.3));
+  apart.add(blow(0, 1.0, 0), 0.001);
+  apart.add(blow(-0.8, 0, 0), 0.002);
+  CHECK(apart.gifts().size() == 1);
+  rubbing.add(blow(-0.8, 0, 1.0), 0.001);  // friction does not strike
+  CHECK(rubbing.gifts().size() == 1);
+}
+
+TEST_CASE("what contacts give to bodies that began within each other is no gift") {
+  const Model model = chain(3);
+  EffectAccount account;
+  account.work.of<PairContact>() = -0.6;
+  account.kinetic = 0.1;
+  PassiveWatch watch(model, Effects{}), less(model, Effects{}), late(model, Effects{});
+  EffectAccount follows = account, nothing = account;
+  account.freed = 1.2;  // half of it in the step that follows
+  nothing.work.of<PairContact>() = 0;
+  watch.add(account, 0.001);
+  watch.add(follows, 0.002);
+  CHECK(watch.gifts().empty());
+  late.add(account, 0.001);
+  late.add(nothing, 0.002);
+  late.add(follows, 0.003);
+  CHECK(late.gifts().size() == 1);
+  account.freed = 0.5;
+  less.add(account, 0.001);
+  REQUIRE(less.gifts().size() == 1);
+  CHECK(less.gifts().front().amount == Approx(0.1));
+}
+
 TEST_CASE("what a gift is measured by does not vanish as things come to rest") {
   const Model model = chain(2);
   PassiveWatch watch(model, Effects{});

@@ -112,7 +112,7 @@ TEST_CASE("a rollout that is killed at any moment goes on to the bit", "[command
     check_begins(read(shell.file("a.h5")), recorded, 10);
     check_begins(recorded, read(shell.file("a.h5")), 10);
     CHECK(checkpoints_in(shell / "kept").back() == 50);
-    CHECK(checkpoints_in(shell / "kept").size() <= 2);
+    CHECK(checkpoints_in(shell / "kept").size() <= 3);  // one more where it was killed between the last one and the removal of the oldest
     for (const auto& entry : fs::recursive_directory_iterator(shell / "kept")) CHECK_THAT(entry.path().string(), !Catch::EndsWith(".part"));
   }
   CHECK(killed > 4);

@@ -1,9 +1,11 @@
 // Shapes that stand in the world: as a scene's `world` has them, as C++ does, and as links that a URDF fixes to the world; bodies touch all of them.
 #include <catch2/catch.hpp>
 
+#include <Eigen/Dense>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +16,7 @@
 #include "engine/scene/scene_file.hpp"
 #include "engine/simulation.hpp"
 #include "engine/view/drawing.hpp"
+#include "models/build/builder.hpp"
 #include "models/build/world_shapes.hpp"
 #include "models/shapes/pair_contact.hpp"
 #include "tests/engine/folder.hpp"
@@ -80,6 +83,13 @@ TEST_CASE("bodies come to rest on shapes of the world of every type, where they 
   CHECK(things.height_of("block", 0.5, "  - {type: box, size: [0.6, 1, 1], rotation: [0, 1.5707963267948966, 0]}\n") == kRests);
   CHECK(things.height_of("block", 0.5, "  - {type: box, size: [0.6, 1, 1], quaternion: [0, 0.7071067811865476, 0, 0.7071067811865476]}\n") ==
         kRests);
+  // an ellipsoid's end, turned to stand up; a plane of every spelling, and one that is tilted under a ball in a groove of two
+  CHECK(things.height_of("ball", 0.5, "  - {type: ellipsoid, radii: [0.1, 0.4, 0.4], position: [0, 0, 0.2], rotation: [0, 1.5707963267948966, 0]}\n") == kRests);
+  CHECK(things.height_of("block", 0.5, "  - {type: plane, height: 0.3}\n") == kRests);
+  CHECK(things.height_of("block", 0.5, "  - {type: plane, normal: [0, 0, 2], position: [7, 8, 0.3]}\n") == kRests);
+  CHECK(things.height_of("block", 0.5, "  - {type: plane, rotation: [0, 0, 1], height: 0.3}\n") == kRests);
+  CHECK(things.height_of("ball", 0.5, "  - {type: plane, normal: [1, 0, 1], position: [0, 0, 0.3]}\n  - {type: plane, normal: [-1, 0, 1], position: [0, 0, 0.3]}\n") ==
+        Approx(0.3 + 0.05 * std::sqrt(2)).margin(1e-6));
   // beside it there is nothing
   CHECK(things.height_of("block", 0.5, "  - {type: box, size: [1, 1, 0.2], position: [0.7, 0, 0.2]}\n", 300) ==
         Approx(0.5 - 0.5 * 9.81 * 0.3 * 0.3).margin(1e-3));
@@ -148,7 +158,7 @@ TEST_CASE("what is wrong with a shape of the world is said with its line") {
     CHECK(found.find('\n') == found.npos);
     for (const std::string& part : parts) CHECK_THAT(found, Contains(part));
   };
-  check("{size: [1, 1, 1]}", {"world[1] has no type", "box, sphere, cylinder, capsule or mesh"});
+  check("{size: [1, 1, 1]}", {"world[1] has no type", "box, sphere, ellipsoid, cylinder, capsule, mesh, plane or heights"});
   check("{type: bock, size: [1, 1, 1]}", {"world[1].type is \"bock\"", "did you mean box?"});
   check("{type: box}", {"world[1], a box, has no size"});
   check("{type: box, size: [1, 0, 1]}", {"world[1].size", "above zero"});
@@ -157,6 +167,17 @@ TEST_CASE("what is wrong with a shape of the world is said with its line") {
   check("{type: sphere, radius: 0}", {"world[1].radius"});
   check("{type: capsule, radius: 1}", {"world[1], a capsule, has no length"});
   check("{type: cylinder, radius: 1, size: 2}", {"the key \"size\" of world[1] is not known", "length"});
+  check("{type: ellipsoid}", {"world[1], an ellipsoid, has no radii"});
+  check("{type: ellipsoid, radii: [1, 2]}", {"world[1].radii", "[a, b, c]"});
+  check("{type: ellipsoid, radii: [1, 0, 2]}", {"world[1].radii", "above zero"});
+  check("{type: ellipsoid, radii: [1, 1, 2], radius: 1}", {"the key \"radius\" of world[1] is not known", "radii"});
+  check("{type: plane, size: [1, 1, 1]}", {"the key \"size\" of world[1] is not known"});
+  check("{type: plane, normal: [0, 0, 0]}", {"world[1].normal", "not all zero"});
+  check("{type: plane, normal: [0, 1]}", {"world[1].normal", "[x, y, z]"});
+  check("{type: plane, height: high}", {"world[1].height"});
+  check("{type: plane, height: 1, position: [0, 0, 1]}", {"world[1]: height and position are both given"});
+  check("{type: plane, normal: [0, 0, 1], rotation: [0, 0, 1]}", {"world[1]: a normal and a turn are both given"});
+  check("{type: plane, name: knob}", {"two links are called \"world/knob\""});
   check("{type: mesh}", {"world[1], a mesh, has no file"});
   check("{type: mesh, file: none.stl}", {"there is no file", "none.stl", "relative to the scene"});
   check("{type: mesh, file: wedge.obj, scale: [1, 0, 1]}", {"world[1].scale", "none of them zero"});
@@ -178,6 +199,39 @@ TEST_CASE("what C++ puts into the world is checked") {
   CHECK_THROWS_WITH(with_world(block, {{"a", {ShapeKind::mesh, {1, 0, 1}, "a.stl"}}}), Contains("its scale is 0"));
   CHECK_THROWS_WITH(with_world(block, {{"a", ball, {.shift = {0, NAN, 0}}}}), Contains("its pose is not finite"));
   CHECK(with_world(block, {{"a", {ShapeKind::mesh, {1, -1, 1}, "a.stl"}}}).welded.shapes.size() == 1);  // mirrored
+  CHECK_THROWS_WITH(with_world(block, {{"a", {ShapeKind::ellipsoid, {1, 0, 1}, ""}}}), Contains("its size is 0"));
+  CHECK_THROWS_WITH(plane_pose({0, 0, 0}, 1), Contains("a plane of normal 0 0 0"));
+  CHECK_THROWS_WITH(plane_pose({0, 0, 1}, NAN), Contains("finite numbers"));
+  const Model floor = with_world(block, {{"floor", {ShapeKind::plane, {}, ""}, plane_pose({0, 0, 3}, 2)}});
+  CHECK(floor.welded.shapes[0].pose.shift == std::array<double, 3>{0, 0, 2});
+  // and they stand in the world alone
+  LinkSpec moving;
+  moving.name = "a";
+  moving.joint = "free";
+  moving.type = JointType::free;
+  moving.inertia = {1, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()};
+  moving.shapes = {{Pose{}, {ShapeKind::plane, {}, ""}}};
+  CHECK_THROWS_WITH(TreeBuilder("robot").add(moving).build(), Contains("link \"a\": a collision shape is an ellipsoid, a plane or heights"));
+  std::vector<std::string> notes;
+  Effects effects;
+  effects.contact = pair_contact_of(floor, notes);
+  CHECK_NOTHROW(check(effects, floor));
+  std::swap(effects.contact->shapes[0].slot, effects.contact->shapes[1].slot);
+  CHECK_THROWS_WITH(check(effects, floor), Contains("a plane or heights are on a body that moves"));
+  CollisionShape hills{ShapeKind::heights, {}, ""};
+  CHECK_THROWS_WITH(with_world(block, {{"a", hills}}), Contains("its heights are no grid"));
+  hills.heights = std::make_shared<const HeightField>(HeightField{2, 2, 1, 1, 0, 0, {0, 0, 0}});
+  CHECK_THROWS_WITH(with_world(block, {{"a", hills}}), Contains("its heights are no grid"));
+  hills.heights = std::make_shared<const HeightField>(HeightField{2, 2, 1, 1, 0, 0, {0, 0, 0, NAN}});
+  CHECK_THROWS_WITH(with_world(block, {{"a", hills}}), Contains("finite numbers"));
+  hills.heights = std::make_shared<const HeightField>(HeightField{2, 2, 1, 1, 0, 0, {0, 0, 0, 1}});
+  const Model hilly = with_world(block, {{"hills", hills}});
+  moving.shapes = {{Pose{}, hills}};
+  CHECK_THROWS_WITH(TreeBuilder("robot").add(moving).build(), Contains("link \"a\": a collision shape is an ellipsoid, a plane or heights"));
+  effects.contact = pair_contact_of(hilly, notes);
+  CHECK_NOTHROW(check(effects, hilly));
+  std::swap(effects.contact->shapes[0].slot, effects.contact->shapes[1].slot);
+  CHECK_THROWS_WITH(check(effects, hilly), Contains("a plane or heights are on a body that moves"));
 }
 
 TEST_CASE("shapes of the world are drawn, beside a robot that shows visuals alone too") {
@@ -197,6 +251,29 @@ TEST_CASE("shapes of the world are drawn, beside a robot that shows visuals alon
   }
   CHECK(visuals == 1);
   CHECK(collisions == 1);
+}
+
+TEST_CASE("planes of the world are drawn as ground, ellipsoids as what they are") {
+  const Things things;
+  const Scene scene = things.scene("model: block.urdf\nbase: floating\nworld: [{type: plane, name: wall, normal: [1, 0, 0], height: 2}, "
+                                   "{type: ellipsoid, name: egg, radii: [1, 2, 3]}]\n" + kEffects);
+  const Drawing drawing = drawing_of(scene.model, scene.effects);
+  int walls = 0, eggs = 0;
+  for (const DrawnPart& part : drawing.parts) {
+    if (part.link == "world/wall") {
+      walls += 1;
+      CHECK(part.layer == Layer::ground);
+      CHECK(part.pose.shift == std::array<double, 3>{2, 0, 0});
+      CHECK(part.pose.rotation[2] == 1);
+    }
+    if (part.link == "world/egg") {
+      eggs += 1;
+      CHECK(part.scale == std::array<double, 3>{1, 2, 3});
+    }
+  }
+  CHECK(walls == 1);
+  CHECK(eggs == 2);  // to be seen, and as what touches
+  CHECK(drawing.warnings.empty());
 }
 
 TEST_CASE("a block falls on a table of a URDF that moves nothing, and tells whom it touches") {

@@ -16,6 +16,7 @@ std::string_view name(Check check) {
     case Check::bits: return "bits";
     case Check::observations: return "observations";
     case Check::contact: return "contact";
+    case Check::blow: return "blow";
   }
   return "";
 }
@@ -33,6 +34,7 @@ std::vector<Difference> differences(const EverydayScene& scene, std::optional<Ch
   if (found.asked(Check::bits)) check_bits(scene, found);
   if (found.asked(Check::observations)) check_observations(scene, found);
   if (found.asked(Check::contact) && scene.effects.contact) check_contact(scene, found);
+  if (found.asked(Check::blow)) check_blow(scene, found);
   return found.list;
 }
 

@@ -12,9 +12,9 @@
 
 namespace linden {
 
-enum class Check : std::uint8_t { refused, position, energy, rest, velocity, bits, observations, contact };
-inline constexpr std::array<Check, 8> kChecks{Check::refused,  Check::position, Check::energy,      Check::rest,
-                                              Check::velocity, Check::bits,     Check::observations, Check::contact};
+enum class Check : std::uint8_t { refused, position, energy, rest, velocity, bits, observations, contact, blow };
+inline constexpr std::array<Check, 9> kChecks{Check::refused,  Check::position, Check::energy,       Check::rest, Check::velocity,
+                                              Check::bits,     Check::observations, Check::contact, Check::blow};
 
 std::string_view name(Check check);
 

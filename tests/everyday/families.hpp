@@ -35,5 +35,13 @@ void check_bits(const EverydayScene& scene, Differences& found);
 void check_observations(const EverydayScene& scene, Differences& found);
 /// What is told of bodies that touch each other.
 void check_contact(const EverydayScene& scene, Differences& found);
+/// Velocities right after a joint has met a limit.
+void check_blow(const EverydayScene& scene, Differences& found);
+
+/// What second order leaves of a row's momentum in a step where bodies turn at `turn` [rad/s], of so much m v^2 in all `moving` [J]; most: the
+/// speed that all energy would give the row, which weighs `inertia`.
+inline double left_by_second_order(double step, double turn, double moving, double most, double inertia) {
+  return step * step * turn * (0.25 * turn * most + moving / (3 * inertia));
+}
 
 }  // namespace linden

@@ -409,10 +409,8 @@ class Reader {
   }
 
  private:
-  /// What second order leaves of a row's momentum where bodies turn so fast, of so much m v^2 in all.
   double second_order(Index row, double turn, double moving) const {
-    const double step = scene_.options.step;
-    return step * step * turn * (0.25 * turn * most_[row] + moving / (3 * inertia_[row]));
+    return left_by_second_order(scene_.options.step, turn, moving, most_[row], inertia_[row]);
   }
   /// A blow of another joint throws what rests on a limit off it; within the step that comes it may be back.
   bool leaves_limit(Index row, const VectorXd& q, double v) const {

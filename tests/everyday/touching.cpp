@@ -109,6 +109,8 @@ class TouchingMaker {
         result.hull = convex_hull(points);
         break;
       }
+      case ConvexKind::plane:
+      case ConvexKind::heights: break;  // without end: no solid is one
     }
     return result;
   }

@@ -23,7 +23,7 @@ namespace {
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
   for (const auto family : {chain_cases, mass_cases, scale_cases, step_cases, orientation_cases, published_cases, stiff_cases,
-                            long_cases, rotor_cases, loop_cases, batch_cases, random_cases, refusal_cases}) {
+                            long_cases, rotor_cases, loop_cases, contact_cases, batch_cases, random_cases, refusal_cases}) {
     std::ranges::move(family(), std::back_inserter(cases));
   }
   return cases;

@@ -87,6 +87,7 @@ std::vector<Case> stiff_cases();
 std::vector<Case> long_cases();
 std::vector<Case> rotor_cases();
 std::vector<Case> loop_cases();
+std::vector<Case> contact_cases();
 std::vector<Case> batch_cases();
 std::vector<Case> random_cases();
 std::vector<Case> refusal_cases();

@@ -135,7 +135,7 @@ std::vector<double> end_of(const Model& model, int order, double h, double durat
   return {simulation.positions().begin(), simulation.positions().end()};
 }
 
-double distance(const std::vector<double>& a, const std::vector<double>& b) {
+double ends_apart_by(const std::vector<double>& a, const std::vector<double>& b) {
   double most = 0;
   for (std::size_t k = 0; k < a.size(); ++k) most = std::isnan(a[k]) ? a[k] : std::max(most, std::abs(a[k] - b[k]));
   return most;
@@ -144,7 +144,7 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
 void trees_over_steps(Report& report, const std::string& what, const Model& model, double largest) {
   const double duration = 0.256;
   const std::vector<double> exact = end_of(model, 8, 2e-3, duration, 0.2);
-  const ErrorAt error = [&](double h) { return distance(end_of(model, 2, h, duration, 0.2), exact); };
+  const ErrorAt error = [&](double h) { return ends_apart_by(end_of(model, 2, h, duration, 0.2), exact); };
   if (report.form() == Form::quick) {
     promise_order(report, what, error, {largest, 2e-3}, 0.1);
   } else {
@@ -155,7 +155,7 @@ void trees_over_steps(Report& report, const std::string& what, const Model& mode
   for (const double h : {1e-5, 1e-6, 1e-7}) {
     const int steps = report.pick(100, 1000, 10'000);
     const std::vector<double> here = end_of(model, 8, h * steps / 10, h * steps, 0.2);
-    const double off = distance(end_of(model, 2, h, h * steps, 0.2), here);
+    const double off = ends_apart_by(end_of(model, 2, h, h * steps, 0.2), here);
     const double rounding = 10 * kEpsilon * std::sqrt(static_cast<double>(steps));
     // local error h^2 of second order at speeds and accelerations of up to 1e3
     const double method = h * h * 1e3 * h * steps;

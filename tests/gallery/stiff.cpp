@@ -14,7 +14,7 @@ namespace {
 
 const std::vector<double> kStiffnesses{1, 1e3, 1e6, 1e9};
 constexpr double kLength = 0.1;  // of a link [m]
-constexpr double kSpread = 0.2;  // of the start [rad, rad/s]
+constexpr double kSpreadOfStart = 0.2;  // of the start [rad, rad/s]
 
 /// Weight acts at the ends of a step, and the middle of a parabola lies h^2 g / 8 beside its chord: that share of a link's
 /// length.
@@ -96,7 +96,7 @@ void over_stiffnesses(Report& report, const Model& model, const std::string& wha
     for (const double k : kStiffnesses) {
       Scenario pulled = scenario(model, {.step = h}, steps);
       pulled.effects = make(k);
-      pulled.start = random_state(*pulled.model, 1, kSpread);
+      pulled.start = random_state(*pulled.model, 1, kSpreadOfStart);
       const Gained gained = pulled.effects.ground ? gain_on_ground(pulled) : gain(pulled);
       worst = std::max(worst, gained.most / gained.scale);
       if (std::isnan(gained.most)) {
@@ -129,14 +129,14 @@ void springs(Report& report) {
   for (const double k : kStiffnesses) {
     const auto steps = report.pick<std::int64_t>(300, 20'000, 500'000);
     Scenario pulled = scenario(model, {.step = 1e-3}, steps);
-    pulled.start = random_state(*pulled.model, 1, kSpread);
+    pulled.start = random_state(*pulled.model, 1, kSpreadOfStart);
     for (const Index row : rows(model)) pulled.effects.springs.push_back({.row = row, .stiffness = k});
     const RunRecord record = run(pulled);
     off = std::max(off, record.energy_error / record.drift.scale());
     if (k == 1e3 && report.form() != Form::quick) promise_no_slope(report, record);
     if (k == 1e3) run_beside(report, pulled, record.drift.scale());
   }
-  report.at_most("springs at 1 ms: energy error / largest kinetic energy", off, kSpread * kSpread,
+  report.at_most("springs at 1 ms: energy error / largest kinetic energy", off, kSpreadOfStart * kSpreadOfStart,
                  "links are coupled by the cosines of their angles: the square of those");
 }
 

@@ -1,6 +1,8 @@
 #include "kernels/collision/broad_phase.hpp"
 
+#include <array>
 #include <catch2/catch.hpp>
+#include <limits>
 #include <vector>
 
 #include "tests/kernels/allocation_counter.hpp"
@@ -51,6 +53,41 @@ TEST_CASE("the pairs of a broad phase are those that meet, in order, whatever ax
       }
     }
   }
+}
+
+TEST_CASE("boxes without end meet all that they are not seen to be beside, and do not change what is found of the others") {
+  Random random(4);
+  BroadPhase phase;
+  auto bounds = random_bounds(random, 60, {5, 1, 1});
+  const auto alone = phase.pairs(bounds, 0.05);
+  const Pairs others(alone.begin(), alone.end());
+  constexpr double kEnd = std::numeric_limits<double>::infinity();
+  bounds.push_back({{-kEnd, -kEnd, -kEnd}, {kEnd, kEnd, 0.5}});
+  bounds.push_back({{-kEnd, -kEnd, -kEnd}, {kEnd, kEnd, kEnd}});
+  bounds.push_back({{1, -kEnd, -kEnd}, {kEnd, kEnd, kEnd}});
+  const auto found = phase.pairs(bounds, 0.05);
+  const Pairs all(found.begin(), found.end());
+  CHECK(all == all_pairs(bounds, 0.05));
+  Pairs rest = all;
+  std::erase_if(rest, [](const auto& pair) { return pair.second >= 60; });
+  CHECK(rest == others);
+  CHECK(all.size() > others.size() + 100);
+  CHECK(all.size() < others.size() + 3 * 60 + 3);
+}
+
+TEST_CASE("a plane has bounds where it lies square to an axis") {
+  const ConvexShape plane{.kind = ConvexKind::plane};
+  constexpr double kEnd = std::numeric_limits<double>::infinity();
+  const auto bounds = [&](const Eigen::Matrix3d& R) { return bounds_of(plane, reference::pose_at(R, {1, 2, 3})); };
+  const Bounds level = bounds(Eigen::Matrix3d::Identity());
+  CHECK(level.high == std::array{kEnd, kEnd, 3.0});
+  CHECK(level.low == std::array{-kEnd, -kEnd, -kEnd});
+  Eigen::Matrix3d R;
+  R << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+  CHECK(bounds(R).low == std::array{1.0, -kEnd, -kEnd});
+  CHECK(bounds(R).high == std::array{kEnd, kEnd, kEnd});
+  const Bounds tilted = bounds(Eigen::AngleAxisd(1e-6, Eigen::Vector3d::UnitX()).toRotationMatrix());
+  CHECK(tilted.high == std::array{kEnd, kEnd, kEnd});
 }
 
 TEST_CASE("a broad phase that has seen as many allocates nothing") {

@@ -480,7 +480,7 @@ TEST_CASE("stacks of ten are solved in a few corrections", "[contact_solve]") {
   CHECK(worst < 2e-9);
   CHECK(most <= 60);
   CHECK(most_rounds <= 3);
-  CHECK(sum <= 2000);
+  CHECK(sum <= 2200);  // before loads were solved for too it was 2000: across and along are apart here, and there is nothing to gain
 }
 
 TEST_CASE("a solve of as many rows as before allocates nothing", "[contact_solve]") {

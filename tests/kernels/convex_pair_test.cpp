@@ -194,6 +194,41 @@ TEST_CASE("a half space is below every shape by its support along the normal") {
   }
 }
 
+TEST_CASE("a plane is that half space, as either of both, and keeps its digits where it is far from the world's origin") {
+  Random random(8);
+  const ConvexShape plane{.kind = ConvexKind::plane};
+  for (int kind = 0; kind < reference::kRandomKinds; ++kind) {
+    for (int k = 0; k < 20; ++k) {
+      const ConvexShape shape = random_shape(random, kind);
+      const Matrix3d R = random.rotation().toRotationMatrix();
+      const Vector3d on(random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(-9, 9));
+      const double height = random.uniform(-0.1, 1);
+      const Vector3d n = R.col(2), middle = on + 3 * R.col(0) - 5 * R.col(1) + height * n;
+      const Pose there = pose_at(R, on), pose = pose_at(random.rotation().toRotationMatrix(), middle);
+      const ContactPatch one = contact_patch(plane, there, shape, pose, 0.2), other = contact_patch(shape, pose, plane, there, 0.2);
+      const ContactPatch expected = plane_patch({n.x(), n.y(), n.z()}, n.dot(on), shape, pose, 0.2);
+      CAPTURE(kind, k, expected.distance);
+      CHECK(std::abs(one.distance - expected.distance) < 1e-14);
+      CHECK(eigen(one.normal) == n);
+      CHECK(other.distance == one.distance);
+      CHECK(eigen(other.normal) == -n);
+      REQUIRE(one.count == expected.count);
+      REQUIRE(other.count == one.count);
+      CHECK((one.count > 0) == (one.distance <= 0.2));
+      for (const PatchPoint& point : points_of(one)) {
+        CHECK(std::abs(n.dot(eigen(point.place) - on) - 0.5 * point.gap) < 2e-14);
+        const auto same = [&](const PatchPoint& p) { return p.feature == (point.feature << 32 | point.feature >> 32) && eigen(p.place) == eigen(point.place); };
+        CHECK(std::ranges::any_of(points_of(other), same));
+      }
+    }
+  }
+  // a kilometre and more away from its own origin and the world's
+  const ConvexShape cube{.kind = ConvexKind::box, .half = {0.1, 0.1, 0.1}};
+  const ContactPatch far = contact_patch(plane, at({1000, 0, 1000}), cube, at({-3000, 0, 1000.0625}), 0.01);
+  CHECK(std::abs(far.distance - (0.0625 - 0.1)) < 1e-15);
+  CHECK(far.count == 4);
+}
+
 TEST_CASE("beyond the margin there are no points, and the distance is a bound below the true one and above the margin") {
   Random random(3);
   int beyond = 0;

@@ -272,6 +272,9 @@ TEST_CASE("a joint that bounces passes a limit that it is not at yet, where the 
       before(kRow) = 0;
       CHECK(stopped_bounces(limits, row.q_row, row.q, row.delta, before, true) == passes);
       before(kRow) = 1e-3;
+      limits.mode(0) = 0;
+      row.delta(kRow) = room;  // and so has one in which it comes there by itself
+      CHECK(stopped_bounces(limits, row.q_row, row.q, row.delta, before, true) == (restitution > 0));
     }
   }
 }

@@ -587,7 +587,7 @@ TEST_CASE("every collision shape of every robot reaches the model, or hangs on w
           ++expected[link->Attribute("name")];
           const std::string kind = collision->FirstChildElement("geometry")->FirstChildElement()->Name();
           meshes += kind == "mesh" ? 1 : 0;
-          spheres += kind == "box" ? 8 : kind == "sphere" ? 1 : 0;
+          spheres += kind == "box" ? 8 : kind == "capsule" ? 2 : kind == "sphere" ? 1 : 0;
           rims += kind == "cylinder" ? 2 : 0;
         }
       }

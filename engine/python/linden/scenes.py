@@ -39,7 +39,8 @@ class Settings(TypedDict, total=False):
     effects: dict[str, Any]
     """{"gravity": [0, 0, -9.81], "servo": {"stiffness": 200}, "ground": {...}, ...}. What is not named is not there, gravity included."""
     world: list[dict[str, Any]]
-    """Shapes that stand in the world: [{"type": "box", "name": "table", "size": [1, 1, 0.1], "position": [0, 0, 0.7]}, ...]."""
+    """Shapes that stand in the world: [{"type": "box", "name": "table", "size": [1, 1, 0.1], "position": [0, 0, 0.7]},
+    {"type": "plane", "normal": [0, 0, 1], "height": 0}, ...]; all types in models/scenes/README.md, "The world"."""
     randomize: dict[str, Any]
     """{"masses": 0.2, "friction": [0.4, 1.0], ...}: what is drawn for each instance."""
 
@@ -113,7 +114,7 @@ def made_scene(source: Model | Scene | str | os.PathLike[str] | None, settings: 
     values = dict(settings)
     effects: dict[str, Any] = {"gravity": [0, 0, -9.81]}
     if source is not None and _core.needs_contact(source.name):
-        effects["contact"] = {"stiffness": 1e8, "friction": 0.6}  # as linden run has it
+        effects["contact"] = {"friction": 0.6}  # as linden run has it
     values.setdefault("effects", effects)
     made = _core.scene_of(source, values)
     _tell(made.model.warnings[known:], stacklevel + 1)

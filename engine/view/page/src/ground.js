@@ -1,4 +1,5 @@
-// The ground: a grid without end that fades out far away and takes shadows, and terrain as the mesh that it is.
+// The ground: a grid without end that fades out far away and takes shadows; terrain, and all planes but one that is level, as the meshes that they
+// are.
 import {
   Color, DoubleSide, Group, Matrix4, Mesh, MeshStandardMaterial, PlaneGeometry, ShaderMaterial, ShadowMaterial, SRGBColorSpace, Vector3,
 } from 'three';
@@ -70,8 +71,9 @@ export function makeGround(recording, { size, whole }) {
   const object = new Group();
   const parts = recording.parts.filter((part) => part.layer === groundLayer);
   const levels = parts.map((part) => levelOf(part, recording.meshes[part.mesh]));
-  const terrain = parts.filter((_, p) => Number.isNaN(levels[p]));
-  const level = levels.find((height) => !Number.isNaN(height));
+  const first = levels.findIndex((height) => !Number.isNaN(height));
+  const level = levels[first];
+  const terrain = parts.filter((_, p) => p !== first);
   const { minor, major } = gridCells(size);
 
   const plane = new PlaneGeometry(2, 2);
