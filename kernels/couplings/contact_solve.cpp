@@ -28,6 +28,10 @@ constexpr double kSteadyLoad = 1e-12, kRoundedLoad = 1e-8, kHardlyLess = 0.7;
 /// last, whose loads are to change, by no less than the square of a share of that change.
 constexpr double kDone = 1e-24, kFirstDone = 1e-8, kShareOfChange = 1e-2;
 
+/// Loads that change by less than this share of the largest, and ever less, are left to rounds, whose factor serves on: a block at rest would make a
+/// second one in every solve.
+constexpr double kNearLoad = 1e-4;
+
 /// A correction is cut where the slope at its end is steeper than this share of that at its beginning; to where it is this small.
 constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
 
@@ -443,8 +447,9 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
     const auto [most, changed] = renew_loads(rows);
     const bool rounded = changed <= kRoundedLoad * most && changed > kHardlyLess * changed_before;
     if (enough <= kDone && (!rubs || changed <= kSteadyLoad * most || rounded)) break;
+    const bool far = changed > kNearLoad * most || changed > kHardlyLess * changed_before;
     changed_before = changed;
-    if (rubs && solve_with_own_loads(rows)) break;
+    if (rubs && far && solve_with_own_loads(rows)) break;
     const double change = rubs && most > 0 ? kShareOfChange * changed / most : 0;
     enough = std::clamp(change * change, kDone, kFirstDone);
   }
