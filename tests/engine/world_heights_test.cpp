@@ -24,6 +24,7 @@
 #include "layout/support/input_error.hpp"
 #include "tests/engine/folder.hpp"
 #include "tests/engine/scenes.hpp"
+#include "tests/engine/solids.hpp"
 
 namespace linden::world_heights_test {
 namespace {
@@ -32,7 +33,8 @@ using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;
+using namespace solids_test;
+
 #ifdef LINDEN_SANITIZED  // which takes ten times as long
 constexpr int kDrops = 1;
 constexpr std::array kSteps{5e-3};
@@ -41,14 +43,9 @@ constexpr int kDrops = 4;
 constexpr std::array kSteps{5e-4, 1e-3, 5e-3};
 #endif
 
-/// A ball, a block and a can of 0.2 m and 1 kg.
-class Solids : public Folder {
+/// With heights.
+class SolidsInHills : public Solids {
  public:
-  Solids() {
-    solid("ball", R"(<sphere radius="0.1"/>)", 0.004);
-    solid("block", R"(<box size="0.2 0.2 0.2"/>)", 0.04 / 6);
-    solid("can", R"(<cylinder radius="0.1" length="0.2"/>)", 0.04 / 6);
-  }
   /// Heights about the origin, as a shape of the world.
   std::string field(int columns, int rows, double spacing, const std::function<double(double, double)>& height, const std::string& more = "") const {
     std::string table;
@@ -60,29 +57,7 @@ class Solids : public Folder {
     write("field.csv", table);
     return fmt::format("  - {{type: heights, name: hills, file: field.csv, spacing: [{0:.17g}, {0:.17g}], origin: [{1:.17g}, {2:.17g}]{3}}}\n", spacing, x, y, more);
   }
-  Scene scene(const std::string& world, const std::string& models, double friction, double step) const {
-    Scene scene = parse_scene(fmt::format("models:\n{}world:\n{}effects: {{gravity: [0, 0, {}], contact: {{friction: {}}}}}\n", models, world, -kGravity, friction),
-                              file("scene.yaml"));
-    scene.options.step = step;
-    scene.start_as_given = true;
-    return scene;
-  }
-
- private:
-  void solid(const std::string& name, const std::string& shape, double inertia) const {
-    write(name + ".urdf", fmt::format(R"(<robot name="{0}"><link name="{0}"><inertial><mass value="1"/><inertia ixx="{1}" iyy="{1}" izz="{1}" )"
-                                      R"(ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry>{2}</geometry></collision></link></robot>)",
-                                      name, inertia, shape));
-  }
 };
-
-std::string body(const std::string& model, const Vector3d& at, const std::string& more = "") {
-  return fmt::format("  - {{model: {0}.urdf, name: {0}, base: floating, position: [{1:.17g}, {2:.17g}, {3:.17g}]{4}}}\n", model, at.x(), at.y(), at.z(), more);
-}
-
-Vector3d place(const Simulation& simulation, std::size_t k = 0) { return Vector3d(&simulation.positions()[7 * k]); }
-
-int steps_of(double time, double step) { return static_cast<int>(std::lround(time / step)); }
 
 const HeightField& field_of(const Simulation& simulation) { return *simulation.model().welded.shapes.at(0).shape.heights; }
 
@@ -92,7 +67,7 @@ std::string rolling(double x, double height, double v) {
 }
 
 TEST_CASE("on level heights a block slides and a ball rolls as on a plane", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const std::string level = solids.field(31, 21, 0.15, [](double, double) { return 0.3; }), plane = "  - {type: plane, name: floor, height: 0.3}\n";
   for (const double step : kSteps) {
     for (const char* const name : {"block", "ball"}) {
@@ -111,7 +86,7 @@ TEST_CASE("on level heights a block slides and a ball rolls as on a plane", "[wo
 }
 
 TEST_CASE("a ball rolls down tilted heights with five sevenths of the pull, whether they are tilted or turned", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const double angle = 0.2;
   const Vector3d up(std::sin(angle), 0, std::cos(angle)), down(std::cos(angle), 0, -std::sin(angle));
   for (const bool turned : {false, true}) {
@@ -130,7 +105,7 @@ TEST_CASE("a ball rolls down tilted heights with five sevenths of the pull, whet
 }
 
 TEST_CASE("a ball rolls over a crease that turns down without a jump of energy", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const std::string world = solids.field(41, 9, 0.2, [&](double x, double) { return -0.1 * std::max(0.0, x); });
   for (const double step : kSteps) {
     CAPTURE(step);
@@ -151,7 +126,7 @@ TEST_CASE("a ball rolls over a crease that turns down without a jump of energy",
 }
 
 TEST_CASE("at a crease that turns up a ball loses what the blow takes, as where two planes meet", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const std::string world = solids.field(41, 9, 0.2, [&](double x, double) { return 0.1 * std::max(0.0, x); });
   const std::string planes = "  - {type: plane, name: floor}\n  - {type: plane, name: ramp, normal: [-0.1, 0, 1]}\n";
   for (const double step : kSteps) {
@@ -173,7 +148,7 @@ TEST_CASE("at a crease that turns up a ball loses what the blow takes, as where 
 }
 
 TEST_CASE("what tumbles over hills falls through nowhere, and gains as little energy as on a slab", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const auto hill = [](double x, double y) { return 0.15 * std::sin(2.1 * x + 0.3) * std::cos(1.7 * y) + 0.05 * std::sin(7 * x - 5 * y); };
   const std::string hills = solids.field(81, 81, 0.1, hill), slab = "  - {type: box, name: floor, size: [40, 40, 2], position: [0, 0, -1]}\n";
   for (const double step : kSteps) {
@@ -215,7 +190,7 @@ TEST_CASE("what tumbles over hills falls through nowhere, and gains as little en
 }
 
 TEST_CASE("beyond the edge of a map its heights go on", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   // a gutter along x, whose map ends at x = 1 and y = 0.4
   const std::string world = solids.field(11, 5, 0.2, [](double, double y) { return 0.25 * std::abs(y); });
   Simulation simulation(solids.scene(world, body("ball", {0, 0, 0.1 * std::sqrt(1 + 0.0625)}, ", velocity: [3, 0, 0]"), 0.5, 1e-3));
@@ -231,7 +206,7 @@ TEST_CASE("beyond the edge of a map its heights go on", "[world_heights]") {
 }
 
 TEST_CASE("in a batch those near heights go alone and the others together, each as it does in any company", "[world_heights][batch]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const std::string world = solids.field(21, 21, 0.2, [](double x, double y) { return 0.1 * std::sin(5 * x) * std::cos(4 * y) - 0.3 * x; });
   const Scene scene = solids.scene(world, body("can", {0, 0, 0.25}, ", angular_velocity: [1, 2, 0]"), 0.5, 1e-3);
   constexpr std::int64_t kSize = 9;
@@ -260,7 +235,7 @@ TEST_CASE("in a batch those near heights go alone and the others together, each 
 }
 
 TEST_CASE("whoever begins in heights is told so", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const Scene scene = solids.scene(solids.field(5, 5, 0.3, [](double, double) { return 0.0; }), body("block", {0, 0, 0.05}), 0.5, 1e-3);
   const StartFindings found = StartCheck(scene.model, scene.options, scene.effects).look(scene.initial.positions);
   CHECK(found.sound());
@@ -269,7 +244,7 @@ TEST_CASE("whoever begins in heights is told so", "[world_heights]") {
 }
 
 TEST_CASE("what is near heights is told for each normal of theirs, and their distance is refused", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const std::string groove = solids.field(5, 5, 0.5, [](double x, double) { return 0.5 * std::abs(x); });
   const double over = 0.1 * std::sqrt(1.25);  // a ball that touches both sides
   Simulation simulation(solids.scene(groove, body("ball", {0, 0, over + 1e-3}), 0.5, 1e-3));
@@ -291,7 +266,7 @@ TEST_CASE("what is near heights is told for each normal of theirs, and their dis
 }
 
 TEST_CASE("a scene with heights goes into bytes and comes back with them, and is drawn where they are", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   const std::string world = solids.field(4, 3, 0.5, [](double x, double y) { return x + 10 * y; }, ", position: [1, 2, 3]");
   const Scene scene = solids.scene(world, body("ball", {0, 0, 30}), 0.5, 1e-3), again = scene_from_bytes(to_bytes(scene));
   REQUIRE(again.effects.contact->shapes[0].shape.heights);
@@ -313,7 +288,7 @@ TEST_CASE("a scene with heights goes into bytes and comes back with them, and is
 }
 
 TEST_CASE("what is wrong with heights of the world is said in one line", "[world_heights]") {
-  const Solids solids;
+  const SolidsInHills solids;
   solids.write("good.csv", "0,1,2\n3,4,5\n");
   solids.write("ragged.csv", "0,1,2\n3,4\n");
   solids.write("row.csv", "0,1,2\n");
