@@ -38,7 +38,7 @@ std::array<double, 3> lengths_of(const SceneValue& at, const std::string& type, 
   const SceneValue size = required(at, type, key, expected);
   const std::array<double, 3> lengths = size.vector(expected);
   for (const double length : lengths) {
-    if (!(length > 0)) size.refuse(expected, advice);
+    if (!(length > 0)) size.fail(fmt::format("{} holds {:g}, {:g} and {:g}", size.path(), lengths[0], lengths[1], lengths[2]), expected, advice);
   }
   return lengths;
 }
