@@ -169,7 +169,7 @@ TEST_CASE("what is wrong with a shape of the world is said with its line") {
   check("{type: cylinder, radius: 1, size: 2}", {"the key \"size\" of world[1] is not known", "length"});
   check("{type: ellipsoid}", {"world[1], an ellipsoid, has no radii"});
   check("{type: ellipsoid, radii: [1, 2]}", {"world[1].radii", "[a, b, c]"});
-  check("{type: ellipsoid, radii: [1, 0, 2]}", {"world[1].radii", "above zero"});
+  check("{type: ellipsoid, radii: [1, 0, 2]}", {"world[1].radii holds 1, 0 and 2", "above zero"});
   check("{type: ellipsoid, radii: [1, 1, 2], radius: 1}", {"the key \"radius\" of world[1] is not known", "radii"});
   check("{type: plane, size: [1, 1, 1]}", {"the key \"size\" of world[1] is not known"});
   check("{type: plane, normal: [0, 0, 0]}", {"world[1].normal", "not all zero"});
