@@ -527,10 +527,10 @@ void cards(Report& report) {
 
 void wall(Report& report) {
   const double step = 2e-3;
-  const Settled bricks = settle("wall:30", 0.6, kRigidContact, step, report.pick(0.02, 1.0, 10.0));
+  const Settled bricks = settle("wall:30", 0.6, kRigidContact, step, report.pick(0.08, 1.0, 10.0));
   promise_steps(report, bricks.refused);
   report.at_most("farthest that a brick moved [m]", bricks.moved, 1e-7, "rigid: a hundred thousandth of what falls in a step, at each course");
-  report.at_most("fastest in the end [m/s]", bricks.fastest, 1e-9, "it stands");
+  report.at_most("fastest in the end [m/s]", bricks.fastest, 1e-9, "it stands, once what it settled by in its first ten steps has died away");
 }
 
 void heap(Report& report) {
