@@ -18,6 +18,10 @@ namespace {
 
 void check_batch(std::int64_t size, const Options& options, const BatchOptions& computed) {
   check(options);
+  if (options.accuracy) {
+    throw InputError(fmt::format("an accuracy of {:g} is asked for, and a batch takes steps of one length and order; leave the accuracy out and give step "
+                                 "and order (a Simulation chooses them)", *options.accuracy));
+  }
   constexpr std::int64_t most = 1'000'000'000;
   if (size < 1 || size > most) throw InputError(fmt::format("{} instances; expected 1 to {}", size, most));
   if (computed.threads < 0 || computed.threads > 4096) {

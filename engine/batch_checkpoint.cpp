@@ -1,6 +1,6 @@
 // Checkpoints of a Batch (engine/checkpoint_bytes.hpp), instance by instance, whatever the lanes are that they are computed in:
 //
-//   "linden batch 4\n"
+//   "linden batch 5\n"
 //   header: what it belongs to, instances, bytes of a number, numbers that effects keep, which rows there are, bytes of the text that follows
 //   kinds of effects and what they act on (engine/effects/effect_owners.hpp); their numbers may be others
 //   of each instance all rows that there are in the order of BatchOf::Data::each, then its record member by member

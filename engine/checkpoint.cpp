@@ -1,8 +1,8 @@
 // Checkpoints of a Simulation (engine/checkpoint_bytes.hpp):
 //
-//   "linden checkpoint 8\n"
+//   "linden checkpoint 9\n"
 //   header: what it belongs to, steps taken, valid rows of history, order, count of the stepper's numbers, bytes of the text that follows and
-//   of what was set
+//   of what was set, whether steps vary
 //   kinds of effects and what they act on (engine/effects/effect_owners.hpp); their numbers may be others
 //   fields of State in the order of LINDEN_STATE_FIELDS, 8 bytes a number
 //   where a step has sub-steps, what their first guesses know (engine/guess/stage_guess.hpp): counts, numbers
@@ -25,8 +25,10 @@
 #include "engine/files/output_file.hpp"
 #include "engine/simulation.hpp"
 #include "engine/solve/stepper.hpp"
+#include "engine/variable_steps.hpp"
 #include "layout/archive.hpp"
 #include "layout/support/input_error.hpp"
+#include "layout/support/members.hpp"
 
 namespace linden {
 
@@ -40,6 +42,8 @@ struct Simulation::Continued {
   EffectWork work;
   PassiveWatch::Known watched;
   std::optional<StepImpulses> impulses;
+  std::optional<Varying::Known> varying;
+  std::optional<LastStep> step_from;
 };
 
 namespace {
@@ -54,8 +58,9 @@ struct Header {
   std::int64_t kept;       // numbers that effects or the solver keep
   std::int64_t effects;    // bytes
   std::int64_t continued;  // bytes
+  std::int64_t vary;       // 1 where steps do
 };
-static_assert(sizeof(Header) == 104, "a checkpoint's header has no padding");
+static_assert(sizeof(Header) == 112, "a checkpoint's header has no padding");
 
 template <class T>
 void append(std::string& bytes, std::span<T> values) {
@@ -108,6 +113,11 @@ Simulation::Continued Simulation::continued() {
   now.work = effect_work_;
   now.watched = watch_->known();
   now.impulses = impulses_;
+  if (varying_) {
+    const std::span<const double> twists = varying_->twists.flat();
+    now.varying = Varying::Known{varying_->choice.law(), varying_->choice.lengths(), *clock_, last_step_, varying_->apart, {twists.begin(), twists.end()}};
+  }
+  if (step_from_) now.step_from = *step_from_;
   return now;
 }
 
@@ -134,6 +144,20 @@ void Simulation::check_continued(const Continued& from, const std::function<void
   for (const auto& watched : from.watched.watched) {
     if (watched.gift < -1 || watched.gift >= static_cast<int>(from.watched.gifts.size())) impossible("an effect's gift that there is not");
   }
+  if (from.step_from) {
+    const LastStep& last = *from.step_from;
+    const bool whole = last.positions.size() == state_.q.flat().size() && last.velocities.size() == nv && std::isfinite(last.time);
+    if (!whole || !std::ranges::all_of(last.positions, is_finite) || !std::ranges::all_of(last.velocities, is_finite)) {
+      impossible("a beginning of the last step that cannot be");
+    }
+  }
+  if (from.varying) {
+    const Varying::Known& known = *from.varying;
+    bool sound = known.twists.size() == varying_->twists.flat().size() && std::ranges::all_of(known.twists, is_finite);
+    for (const double number : {known.clock, known.last_step, known.apart, known.law.theta}) sound = sound && not_negative(number);
+    each_member(known.law, [&](auto number) { sound = sound && std::isfinite(static_cast<double>(number)); });
+    if (!sound || known.law.theta == 0) impossible("lengths of steps that cannot be");
+  }
   if (!from.impulses) return;
   stepper_->keep_impulses();
   if (sizes_of(*from.impulses) != sizes_of(stepper_->impulses())) impossible("forces of other effects");
@@ -142,6 +166,14 @@ void Simulation::check_continued(const Continued& from, const std::function<void
   for (const TouchImpulse& touch : from.impulses->touches) {
     if (touch.pair >= pairs || !is_slot(touch.slot_a) || !is_slot(touch.slot_b)) impossible("contacts of other bodies");
   }
+}
+
+void Simulation::check_accuracy_of(const Continued& from, const std::string& name) const {
+  const auto said = [](bool varies, double accuracy) { return varies ? fmt::format("variable steps of accuracy {:g}", accuracy) : "fixed steps"; };
+  const double saved = from.varying ? from.varying->lengths.accuracy : 0, here = varying_ ? *options_.accuracy : 0;
+  if (from.varying.has_value() == (varying_ != nullptr) && saved == here) return;
+  throw InputError(fmt::format("{}: this checkpoint was made with {}; the simulation has {}, so it would not continue the same run", name,
+                               said(from.varying.has_value(), saved), said(varying_ != nullptr, here)));
 }
 
 void Simulation::go_on(const Continued& from) {
@@ -165,6 +197,15 @@ void Simulation::go_on(const Continued& from) {
   }
   effect_work_ = from.work;
   watch_->go_on(from.watched);
+  if (from.varying) {
+    varying_->choice.law() = from.varying->law;
+    varying_->choice.lengths() = from.varying->lengths;
+    clock_ = from.varying->clock;
+    last_step_ = from.varying->last_step;
+    varying_->apart = from.varying->apart;
+    std::ranges::copy(from.varying->twists, varying_->twists.flat().begin());
+  }
+  step_from_ = from.step_from ? std::make_unique<LastStep>(*from.step_from) : nullptr;
   if (from.impulses) {
     impulses_ = from.impulses;
   } else if (impulses_) {
@@ -186,7 +227,8 @@ std::string Simulation::checkpoint() {
                       options_.order,
                       count_of(stepper_->memory()),
                       static_cast<std::int64_t>(effects.size()),
-                      static_cast<std::int64_t>(continued_bytes.bytes().size())};
+                      static_cast<std::int64_t>(continued_bytes.bytes().size()),
+                      varying_ ? 1 : 0};
   std::string bytes;
   append(bytes, std::span(&header, 1));
   bytes += effects;
@@ -201,6 +243,12 @@ std::string Simulation::checkpoint() {
 }
 
 void Simulation::save(const std::string& file) { write_file(file, checkpoint()); }
+
+Simulation::SavedSteps Simulation::saved_steps(const std::string& file) {
+  CheckpointBytes bytes(file);
+  const auto header = CheckpointReader(bytes, kOfSimulation).header<Header>();
+  return {header.vary != 0, header.of.step};
+}
 
 void Simulation::load(const std::string& file) {
   CheckpointBytes bytes(file);
@@ -258,6 +306,7 @@ void Simulation::restore(CheckpointBytes& bytes) {
   BytesIn more(in.next(continued_size), bytes.name());
   more.read(continued);
   more.end();
+  check_accuracy_of(continued, bytes.name());
   check_continued(continued, [&](const std::string& what) { in.impossible(what); });
   // nothing can go wrong any more
   const char* from = kept.data();

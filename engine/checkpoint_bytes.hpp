@@ -50,8 +50,8 @@ struct CheckpointKind {
   std::string_view line, any_version;
   const char* of;  // "simulation"
 };
-inline constexpr CheckpointKind kOfSimulation{"linden checkpoint 8\n", "linden checkpoint ", "simulation"};
-inline constexpr CheckpointKind kOfBatch{"linden batch 4\n", "linden batch ", "batch"};
+inline constexpr CheckpointKind kOfSimulation{"linden checkpoint 9\n", "linden checkpoint ", "simulation"};
+inline constexpr CheckpointKind kOfBatch{"linden batch 5\n", "linden batch ", "batch"};
 
 /// Reads one from its beginning to its end. Everything throws InputError for what does not fit.
 class CheckpointReader {

@@ -59,7 +59,14 @@ Solver solver_from(const std::string& text) { return choice_in<Solver>(kSolvers,
 FirstGuess guess_from(const std::string& text) { return choice_in<FirstGuess>(kGuesses, "first guess", text); }
 StopTest stop_from(const std::string& text) { return choice_in<StopTest>(kStops, "stop test", text); }
 
+void check_accuracy(const Options& options) {
+  if (!options.accuracy || (*options.accuracy >= kLeastAccuracy && *options.accuracy <= kMostAccuracy)) return;
+  throw InputError(fmt::format("the accuracy is {:g}; expected how far energy may stray over the largest kinetic energy, {:g} to {:g}, such as 1e-6",
+                               *options.accuracy, kLeastAccuracy, kMostAccuracy));
+}
+
 void check(const Options& options) {
+  check_accuracy(options);
   if (!(options.step > 0) || !std::isfinite(options.step)) {
     throw InputError(fmt::format("the step is {} s; it must be positive and finite (1e-3 s suits most robots)", options.step));
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -39,7 +40,19 @@ struct Options {
   double reduction = 0;    // share of the first guess's residual at which a solve has converged as well; 0: none
   int max_iterations = 0;  // corrections in one solve; 0: 50 for newton, 1,000 for riqn
   int max_splits = 8;      // a step that fails is split in two this many times over: down to h / 256
+
+  /// How far energy may stray from where it began, over the largest kinetic energy, with effects that take or give some of H + taken - given. Then
+  /// order, tolerance and every step follow from it (engine/solve/step_choice.hpp); unset: all steps are `step`.
+  std::optional<double> accuracy{};
+  /// With an accuracy: whether steps vary. `step` is then the first where nothing moves yet, and a hundredth of the longest. Where they do not
+  /// all are `step`, and the accuracy chooses order and tolerance alone.
+  bool vary = true;
+
+  bool varies() const { return accuracy && vary; }
 };
+
+/// The least and the largest accuracy that can be asked for: rounding of energies; what is no motion any more.
+inline constexpr double kLeastAccuracy = 1e-12, kMostAccuracy = 0.1;
 
 /// Of single precision nothing better can be asked: rounding leaves about so much of the residual.
 inline constexpr double kSingleTolerance = 3e-6;
@@ -62,6 +75,9 @@ std::string_view name(StopTest stop);
 Solver solver_from(const std::string& text);
 FirstGuess guess_from(const std::string& text);
 StopTest stop_from(const std::string& text);
+
+/// Throws InputError for an accuracy that makes no sense.
+void check_accuracy(const Options& options);
 
 /// Throws InputError where a value makes no sense: a step that is not positive and finite, a tolerance below zero, ...
 void check(const Options& options);

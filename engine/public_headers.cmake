@@ -40,6 +40,7 @@ set(linden_public_headers
   engine/simulation.hpp
   engine/solve/instructions.hpp
   engine/start_check.hpp
+  engine/step_pilot.hpp
   engine/step_report.hpp
   engine/view/animation.hpp
   engine/view/animation_recorder.hpp

@@ -14,6 +14,7 @@
 #include "engine/solve/instance_stepper.hpp"
 #include "engine/start_check.hpp"
 #include "engine/threads.hpp"
+#include "engine/variable_steps.hpp"
 #include "kernels/tree/mimic.hpp"
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
@@ -22,9 +23,18 @@ namespace linden {
 
 namespace {
 
-const Options& checked(const Options& options, const Model& model, const Effects& effects) {
-  check_order(options.order, model, effects);
-  return options;
+Options checked(const Options& options, const Model& model, const Effects& effects) {
+  check_accuracy(options);
+  Options chosen = with_accuracy(options, model, effects);
+  check_order(chosen.order, model, effects);
+  return chosen;
+}
+
+/// Variable steps that fail are taken again, shorter, instead of being split.
+Options of_each_step(const Options& options) {
+  Options of_step = options;
+  if (options.varies()) of_step.max_splits = 0;
+  return of_step;
 }
 
 }  // namespace
@@ -33,18 +43,22 @@ Simulation::Simulation(Model model, const Options& options, const Effects& effec
     : Simulation(std::make_shared<const Model>(std::move(model)), options, effects) {}
 
 Simulation::Simulation(std::shared_ptr<const Model> model, const Options& options, const Effects& effects)
-    : model_(required(std::move(model))), options_(checked(options, *model_, effects)), plan_(std::make_unique<EffectPlan>(*model_, options, effects)),
-      stepper_(make_stepper(*model_, options, *plan_)) {
+    : model_(required(std::move(model))), options_(checked(options, *model_, effects)), plan_(std::make_unique<EffectPlan>(*model_, options_, effects)),
+      stepper_(make_stepper(*model_, of_each_step(options_), *plan_)) {
   if (model_->tree.most_threads() > 1) require_threads(threads_here());
   state_.allocate(model_->tree.shape);
   rate_.allocate(model_->tree.shape.velocities);
   std::ranges::copy(model_->neutral(), state_.q.flat().begin());
-  if (const std::span<const double> stages = composition(options.order); stages.size() > 1) {
+  if (const std::span<const double> stages = composition(options_.order); stages.size() > 1) {
     stage_guess_.emplace(stages, model_->tree.shape.velocities);
     good_q_ = state_.q;
     good_p_ = state_.p;
   }
   watch_.emplace(*model_, plan_->effects);
+  if (options_.varies()) {
+    varying_ = std::make_unique<Varying>(*model_, options_, plan_->effects);
+    clock_ = 0;
+  }
   for (const BodyWrench& wrench : plan_->effects.wrenches) own_wrenches_.push_back(numbers_of(wrench));
   changed();
   if (!plan_->curves.empty()) set_positions(model_->neutral());
@@ -72,9 +86,16 @@ void Simulation::check_row_count(const char* what, std::size_t found, Index expe
   }
 }
 
+/// A start: nothing is known of what was before.
 void Simulation::changed() {
-  history_ = 0;
+  forget_past();
   if (impulses_) impulses_->clear();
+  if (varying_) varying_->begin();
+  step_from_.reset();
+}
+
+void Simulation::forget_past() {
+  history_ = 0;
   stepper_->forget();
   std::ranges::fill(state_.history.flat(), 0.0);
   if (stage_guess_) stage_guess_->forget();
@@ -137,6 +158,7 @@ void Simulation::set_forces(std::span<const double> force) {
   applied_.assign(force.begin(), force.end());
   stepper_->apply(applied_);
   stepper_->refresh(state_);
+  if (varying_) varying_->choice.begin_energy();
 }
 
 std::vector<std::string> Simulation::servo_names() const { return joints_of(*model_, plan_->effects.servos); }
@@ -226,17 +248,22 @@ StepsReport Simulation::run(std::int64_t steps) {
 
 StepReport Simulation::take_step(Then then) {
   require_closed(assembly_);
-  const StepReport report = stage_guess_ ? step_in_stages() : stepper_->step(state_, history_, time(), options_.step, then);
+  const StepReport report = varying_ ? variable_step() : step_of(options_.step, then);
   if (report.ok()) {
     ++steps_;
     if (impulses_ && !stage_guess_) *impulses_ = stepper_->impulses();
     effect_work_.add(stepper_->effect_account().work);
     if (plan_->any()) watch_->add(stepper_->effect_account(), time());
+    if (varying_ && varying_->choice.looks()) look_at_energy(stage_guess_ ? varying_->energy : energy());
   }
   return report;
 }
 
-StepReport Simulation::step_in_stages() {
+StepReport Simulation::step_of(double h, Then then) {
+  return stage_guess_ ? step_in_stages(h) : stepper_->step(state_, history_, time(), h, then);
+}
+
+StepReport Simulation::step_in_stages(double h) {
   std::ranges::copy(state_.q.flat(), good_q_.flat().begin());
   std::ranges::copy(state_.p.flat(), good_p_.flat().begin());
   StepReport whole;
@@ -245,7 +272,7 @@ StepReport Simulation::step_in_stages() {
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const bool known = extrapolates ? stage_guess_->predict(i, state_.history) : stage_guess_->repeat(i, state_.history);
     history_ = known ? 1 : 0;
-    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * options_.step, Then::stop);
+    const StepReport report = stepper_->step(state_, history_, time(), stages[i] * h, Then::stop);
     whole.add(report);
     if (report.ok()) {
       if (impulses_) {
@@ -262,7 +289,8 @@ StepReport Simulation::step_in_stages() {
     // back to the beginning; sub-steps that were taken have lost part of their past, so all begin anew
     std::ranges::copy(good_q_.flat(), state_.q.flat().begin());
     std::ranges::copy(good_p_.flat(), state_.p.flat().begin());
-    changed();
+    forget_past();
+    if (impulses_) impulses_->clear();
     break;
   }
   return whole;
@@ -276,7 +304,7 @@ void Simulation::keep_forces() {
 
 std::vector<double> Simulation::mean_forces(const std::vector<double>& impulses) const {
   std::vector<double> forces = impulses;
-  for (double& number : forces) number /= options_.step;
+  for (double& number : forces) number /= last_step();
   return forces;
 }
 
@@ -304,7 +332,7 @@ std::vector<BodyContact> Simulation::contacts() const {
     const Index slot = plan_->ground.points[k].slot;
     if (bodies.empty() || bodies.back().slot != slot) bodies.push_back({slot});
     bodies.back().closed += impulses.closed[k];
-    bodies.back().normal_force += impulses.ground[k] / options_.step;
+    bodies.back().normal_force += impulses.ground[k] / last_step();
   }
   return bodies;
 }
@@ -315,10 +343,11 @@ std::vector<double> Simulation::accelerations() const {
   }
   std::vector<double> rows(static_cast<std::size_t>(model_->tree.shape.velocities), 0.0);
   if (history_ < 2) return rows;
-  const double rate = 1 / options_.step;
+  // rows of history are as of steps of the last one's length, which differ by as much as they were apart
+  const double rate = 1 / last_step(), per = varying_ ? 1 / varying_->apart : rate;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto row = static_cast<Index>(k);
-    rows[k] = rate * (rate * (state_.history(row, 0) - state_.history(row, 1)));
+    rows[k] = per * (rate * (state_.history(row, 0) - state_.history(row, 1)));
   }
   return rows;
 }

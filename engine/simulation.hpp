@@ -58,6 +58,7 @@ struct ContactPoint {
   std::array<double, 3> place{};     // where they touch, world frame [m]
   std::array<double, 3> normal{};    // of the ground there, or of what pushes, towards the body; unit length, world frame
   std::array<double, 3> force{};     // on the body, friction with it, mean over the step; world frame [N]
+  std::array<double, 3> moment{};    // likewise, against rolling and spinning, beside that of the force at its place [N m]
   Index other = 0;                   // body that pushes; 0: the ground, or what is fixed to the world
   std::string link{}, other_link{};  // whose shapes touch, where two do; what stands in the world has a name too
 };
@@ -77,8 +78,12 @@ class Simulation {
   const Options& options() const { return options_; }
   /// As they act: what stood on followers of mimic joints is on their leaders.
   const Effects& effects() const;
-  double time() const { return static_cast<double>(steps_) * options_.step; }
+  double time() const { return clock_ ? *clock_ : static_cast<double>(steps_) * options_.step; }
   std::int64_t steps() const { return steps_; }
+  /// Length of the step taken last, or of the first to come [s].
+  double last_step() const { return clock_ && last_step_ > 0 ? last_step_ : options_.step; }
+  /// How long variable steps were, and what became of the accuracy asked for: nothing where steps do not vary.
+  std::optional<StepLengths> step_lengths() const;
 
   std::span<const double> positions() const { return state_.q.flat(); }
   std::span<const double> momenta() const { return state_.p.flat(); }
@@ -127,8 +132,14 @@ class Simulation {
   StepReport step();
   /// So many steps, or fewer where one fails: the same motion to the last bit. A large tree is gone over once less a step so.
   StepsReport run(std::int64_t steps);
+  /// Steps to the first node at or past t [s]; none where the simulation is there already. With variable steps too the motion has the same bits wherever
+  /// it is stopped: t ends no step.
+  StepsReport advance_to(double t);
+  /// Positions [nq] at a time within the last step of advance_to: between its ends those of the cubic through positions and velocities there, joint
+  /// by joint, of ball and free joints in their displacements. Throws InputError for other times.
+  std::vector<double> positions_at(double t);
   /// describe(const StepsReport&) tells of steps that were split.
-  std::string describe(const StepReport& report) const { return linden::describe(report, *model_, options_.step); }
+  std::string describe(const StepReport& report) const { return linden::describe(report, *model_, last_step()); }
 
   /// From the next step on it is kept what effects applied, at the cost of a pass up the tree a step where something acts on bodies. What
   /// follows is zero before that, and throws InputError where this was not called.
@@ -144,6 +155,8 @@ class Simulation {
   /// Every place where the ground pushes at the end of the step, sorted by slot; then every place where bodies push each other, once, in the order of
   /// their pairs. The forces of one that was pushed before, and is not any more, are not among them.
   std::vector<ContactPoint> contact_points() const;
+  /// What contacts of bodies with each other keep from step to step (engine/sweeps/body_contacts.hpp), for observations; empty without.
+  std::span<const double> contact_memory();
   /// Wrench of all effects on each body [slots x 6]: moment about its origin [N m], force [N]; in the frame that the body had when the step
   /// began.
   std::vector<double> body_wrenches() const;
@@ -166,10 +179,16 @@ class Simulation {
 
   /// All that a run depends on, so that one continued from it is bit-identical: the state, forces, servo targets, gains, friction and wrenches
   /// that were set, what effects gave and took, and the forces that are kept (keep_forces). What was not set is as the effects of the
-  /// simulation have it that loads. load throws InputError for another model's checkpoint, another step, order or gravity, effects on other
+  /// simulation have it that loads. load throws InputError for another model's checkpoint, another step, accuracy, order or gravity, effects on other
   /// joints or bodies (their numbers may be others), a file that is cut short or is no checkpoint; the simulation is then unchanged.
   void save(const std::string& file);
   void load(const std::string& file);
+  /// Whether the steps of the run that a file was saved of vary; if not, their length [s]. Throws InputError where it cannot be read.
+  struct SavedSteps {
+    bool vary;
+    double step;
+  };
+  static SavedSteps saved_steps(const std::string& file);
   /// The same in memory. name: of where the bytes come from, for messages.
   std::string checkpoint();
   void restore(std::string_view bytes, const std::string& name = "checkpoint");
@@ -180,15 +199,24 @@ class Simulation {
   struct Continued;
   Continued continued();
   void check_continued(const Continued& from, const std::function<void(const std::string&)>& impossible);
+  void check_accuracy_of(const Continued& from, const std::string& name) const;
   void go_on(const Continued& from);
   void restore(CheckpointBytes& bytes);
   static std::array<double, 6> numbers_of(const BodyWrench& wrench);
   std::vector<double> mean_forces(const std::vector<double>& impulses) const;
   void check_row_count(const char* what, std::size_t found, Index expected) const;
   void changed();
+  void forget_past();
   void close_nearly_closed();
   StepReport take_step(Then then);
-  StepReport step_in_stages();
+  StepReport step_of(double h, Then then);
+  StepReport step_in_stages(double h);
+  StepReport variable_step();
+  StepReport step_halved_until_taken(double h);
+  double next_landing() const;
+  double next_length() const;
+  void measure(double h);
+  void look_at_energy(const Energy& now);
 
   std::shared_ptr<const Model> model_;
   Options options_;
@@ -204,6 +232,12 @@ class Simulation {
   std::optional<PassiveWatch> watch_;
   std::int64_t steps_ = 0;
   int history_ = 0;
+  struct Varying;
+  std::unique_ptr<Varying> varying_;    // where steps vary
+  std::optional<double> clock_;         // likewise: time [s]
+  double last_step_ = 0;                // likewise
+  struct LastStep;
+  std::unique_ptr<LastStep> step_from_;  // where the step began that positions_at is asked about
   std::optional<StageGuess> stage_guess_;  // where a step has several sub-steps; none of them then looks at the state's history
   Field<double> good_q_, good_p_;  // at the beginning of a step of several sub-steps
 };

@@ -52,6 +52,17 @@ struct StepsReport {
   bool ok() const { return last.ok(); }
 };
 
+/// Variable steps since the last start, and the accuracy they were chosen for (engine/solve/step_choice.hpp).
+struct StepLengths {
+  std::int64_t steps = 0;
+  double shortest = 0, longest = 0, mean = 0;  // [s]
+  std::int64_t retaken = 0;                    // steps that failed and were taken again, shorter
+  double accuracy = 0;                         // asked for
+  double strayed = 0;                          // band of the energy over the largest kinetic energy, as far as it was looked at
+  int lowered = 0;                             // times that steps were made shorter by 0.7 for good because it strayed further
+  bool kept() const { return strayed <= accuracy; }
+};
+
 /// One sentence on steps that were split; empty where none was.
 std::string describe(const StepsReport& report);
 

@@ -20,7 +20,10 @@ constexpr std::array kPointOnPlane{along_z};
 constexpr std::array kRod{GapRow{GapKind::length}};
 constexpr std::array kGear{GapRow{GapKind::sum}};
 constexpr std::array kCable{GapRow{GapKind::length}};
+constexpr GapRow about_x{GapKind::turn, 0}, about_y{GapKind::turn, 1}, about_z{GapKind::turn, 2};
 constexpr std::array kRoundContact{along_x, along_y, GapRow{GapKind::length}};
+constexpr std::array kTurningFaceContact{along_x, along_y, along_z, about_x, about_y, about_z};
+constexpr std::array kTurningRoundContact{along_x, along_y, GapRow{GapKind::length}, about_x, about_y, about_z};
 constexpr std::array kBushing{GapRow{GapKind::halfway, 0}, GapRow{GapKind::halfway, 1}, GapRow{GapKind::halfway, 2},
                               GapRow{GapKind::angle, 0},   GapRow{GapKind::angle, 1},   GapRow{GapKind::angle, 2}};
 
@@ -43,6 +46,7 @@ std::size_t axis_of(const GapRow& row) {
   switch (row.kind) {
     case GapKind::shift:
     case GapKind::halfway:
+    case GapKind::turn:
     case GapKind::angle: return static_cast<std::size_t>(row.a);
     case GapKind::product: return static_cast<std::size_t>(3 - row.a - row.b);  // about which both turn away from their right angle
     case GapKind::length:
@@ -81,6 +85,9 @@ std::span<const GapRow> rows_of(CouplingKind kind) {
 }
 
 std::span<const GapRow> rows_of(const Coupling& coupling) {
+  if (is_contact(coupling.kind) && coupling.length > 0) {
+    return coupling.kind == CouplingKind::face_contact ? std::span<const GapRow>(kTurningFaceContact) : std::span<const GapRow>(kTurningRoundContact);
+  }
   if (coupling.kind != CouplingKind::bushing) return rows_of(coupling.kind);
   std::size_t chosen = 0;
   for (std::size_t row = 0; row < kBushing.size(); ++row) {

@@ -25,6 +25,9 @@
 //   face_contact    d_x, d_y; of the middles d_z - roundings           3   a has the face, z is fixed in it
 //   round_contact   d_x, d_y; of the middles |d| - roundings           3
 //
+// One that resists turning has three more rows, of how far B has turned against A since the beginning of the step, 2 sin(half the turn) along x, y and z
+// of A, times an arm, its `length`.
+//
 // What of b is an ellipsoid or a circle rolls on the face likewise, by its `oval` Q, the sum of the squares of its semi-axes as dyads: its place that
 // lies lowest along n, as b sees it, is Q n / sqrt(n.Q n) before its centre, at q^k and at q^k+1. A point that turned on with the body would rise.
 //
@@ -57,6 +60,7 @@ enum class GapKind : std::uint8_t {
   length,   // distance beyond the length; of a cable beyond its coordinate
   sum,      // of coordinates
   halfway,  // d along axis a of A turned half-way to B, about the axis that turns it into B; after half a turn there are two such
+  turn,     // 2 sin(half the turn of B against A) along axis a of A, times the length
   angle,    // 0 roll, 1 pitch, 2 yaw of B in A: A^T B = R_z(yaw) R_y(pitch) R_x(roll); where the pitch is 90 degrees there are no two others
 };
 
@@ -91,7 +95,7 @@ struct Coupling {
   CouplingKind kind = CouplingKind::ball;
   Index slot_a = 0, slot_b = 0;  // 0: the world; of gears and cables both
   Pose frame_a{}, frame_b{};     // in the frames of the bodies
-  double length = 0;             // [m], of a rod; of a cable that in the zero configuration
+  double length = 0;             // [m], of a rod; of a cable that in the zero configuration; of a contact that resists turning the arm of its turns
   std::vector<GearTerm> terms{}; // of a gear; of a cable one, its length
   double offset = 0;             // of a gear
   std::vector<CablePoint> points{};  // of a cable, from end to end

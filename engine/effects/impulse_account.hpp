@@ -84,7 +84,8 @@ class ImpulseAccount {
         const auto T = load<Placement, double>(pose, slot);
         const Vec3<double> push = sign * Vec3<double>::from(touch.impulse.data()), arm = Vec3<double>::from(touch.place.data()) - T.p;
         double* const wrench = &sum_.bodies[6 * static_cast<std::size_t>(slot)];
-        (Vec3<double>::from(wrench) + transpose_times(T.R, cross(arm, push))).to(wrench);
+        const Vec3<double> moment = cross(arm, push) + sign * Vec3<double>::from(touch.moment.data());
+        (Vec3<double>::from(wrench) + transpose_times(T.R, moment)).to(wrench);
         (Vec3<double>::from(wrench + 3) + transpose_times(T.R, push)).to(wrench + 3);
       }
     }

@@ -22,6 +22,7 @@ struct TouchImpulse {
   std::array<double, 3> place{};     // world frame [m]
   std::array<double, 3> normal{};    // from a to b, world frame
   std::array<double, 3> impulse{};   // on b, world frame [N s]
+  std::array<double, 3> moment{};    // likewise, against rolling and spinning, beside that of the impulse at its place [N m s]
 };
 
 struct StepImpulses {
@@ -45,7 +46,10 @@ struct StepImpulses {
   void add_touches(std::vector<TouchImpulse> part) {
     for (TouchImpulse& touch : part) {
       const auto before = std::ranges::find_if(touches, [&](const TouchImpulse& one) { return one.pair == touch.pair && one.feature == touch.feature; });
-      for (std::size_t k = 0; before != touches.end() && k < 3; ++k) touch.impulse[k] += before->impulse[k];
+      for (std::size_t k = 0; before != touches.end() && k < 3; ++k) {
+        touch.impulse[k] += before->impulse[k];
+        touch.moment[k] += before->moment[k];
+      }
     }
     touches = std::move(part);
   }

@@ -78,6 +78,10 @@ void StageGuess::forget(std::size_t stage) {
   std::fill(row(stage, 0), row(stage, kRows + 1), 0.0);
 }
 
+void StageGuess::change_length(double times) {
+  for (double& number : numbers_) number *= times;
+}
+
 void StageGuess::forget() {
   std::ranges::fill(known_, 0);
   std::ranges::fill(numbers_, 0.0);

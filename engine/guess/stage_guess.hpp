@@ -41,6 +41,8 @@ class StageGuess {
   /// The sub-step was taken in parts.
   void forget(std::size_t stage);
   void forget();
+  /// Steps are so many times as long from now on: what is known of displacements is brought to that.
+  void change_length(double times);
 
   /// For checkpoints: how many displacements of each sub-step are known; these, and what was missed.
   std::span<std::int64_t> known() { return known_; }

@@ -160,6 +160,8 @@ std::string what_of(std::span<const PairContact> list, const Effects&, const Mod
   std::string text = rigid ? std::string("rigid") : fmt::format("stiffness {} N/m", range(&ContactMaterial::stiffness));
   if (any(&ContactMaterial::damping)) text += fmt::format(", damping {} N s/m", range(&ContactMaterial::damping));
   text += fmt::format(", friction {}", range(&ContactMaterial::friction));
+  if (any(&ContactMaterial::rolling_friction)) text += fmt::format(", rolling friction {} m", range(&ContactMaterial::rolling_friction));
+  if (any(&ContactMaterial::torsional_friction)) text += fmt::format(", torsional friction {} m", range(&ContactMaterial::torsional_friction));
   if (any(&ContactMaterial::restitution)) text += fmt::format(", restitution {}", range(&ContactMaterial::restitution));
   return fmt::format("{}; {}", text, counted(std::ssize(contact.pairs), "pair"));
 }
@@ -244,7 +246,12 @@ Json json_of(const PairContact& contact) {
   Json materials = Json::array();
   for (const ContactMaterial& one : contact.materials) {
     Json stiffness = std::isfinite(one.stiffness) ? Json(one.stiffness) : Json("rigid");
-    materials.push_back({{"stiffness", stiffness}, {"damping", one.damping}, {"friction", one.friction}, {"restitution", one.restitution}});
+    materials.push_back({{"stiffness", stiffness},
+                         {"damping", one.damping},
+                         {"friction", one.friction},
+                         {"rolling_friction", one.rolling_friction},
+                         {"torsional_friction", one.torsional_friction},
+                         {"restitution", one.restitution}});
   }
   return {{"materials", materials}, {"shapes", contact.shapes.size()}, {"pairs", contact.pairs.size()}};
 }

@@ -265,7 +265,9 @@ class Printer {
   void effects() const {
     if (!arguments_.scene) return;
     const Scene& scene = *arguments_.scene;
-    say("\neffects of the scene: {:g} s in steps of {:g} s\n", scene.duration, arguments_.options.step);
+    const Options& options = arguments_.options;
+    const std::string steps = options.varies() ? fmt::format("steps for an accuracy of {:g}", *options.accuracy) : fmt::format("steps of {:g} s", options.step);
+    say("\neffects of the scene: {:g} s in {}\n", scene.duration, steps);
     const auto& g = arguments_.options.gravity;
     const std::vector<EffectLine> lines = effect_lines(scene.effects, model_);
     std::size_t width = 9;

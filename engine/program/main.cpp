@@ -107,6 +107,7 @@ CLI::App* add_run(CLI::App& program, OptionTexts& texts, RunArguments& run) {
   add("Method", "--stop", texts.stop, "NAME", "energy (default: relative) or absolute (|r| in N m s)");
   add("Method", "--tolerance", texts.tolerance, "T", "of the solver, default 1e-10, above order 2 less");
   add("Method", "--order", texts.order, "N", "of the integrator: 2 (default), 4, 6 or 8");
+  add("Method", "--accuracy", texts.accuracy, "A", "energy band over the largest kinetic energy; order and steps follow from it");
   add("Output", "--record", run.record, "FILE.csv|npz|h5", "time, energy and what --what says, one row a step");
   add("Output", "--what", texts.what, "LIST", "what is recorded and plotted, with commas; see below");
   add("Output", "--observe", texts.observe, "LIST", "observations beside it: pose:hand,com,contact:foot; see below");

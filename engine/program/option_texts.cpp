@@ -108,6 +108,15 @@ void read_order(const OptionTexts& texts, Options& options) {
   if (!chosen) use_default_tolerance(options);
 }
 
+/// A step that is given beside it is the length of all.
+void read_accuracy(const OptionTexts& texts, Options& options) {
+  if (!texts.accuracy.empty()) {
+    options.accuracy = number_from("--accuracy", texts.accuracy, "how far energy may stray over the largest kinetic energy, such as 1e-6");
+    options.vary = true;
+  }
+  if (!texts.dt.empty()) options.vary = false;
+}
+
 template <class Arguments>
 void read_recording_options(const OptionTexts& texts, Arguments& arguments) {
   if (!texts.every.empty()) arguments.every = integer_from("--every", texts.every, "steps between frames, such as 10");
@@ -163,6 +172,7 @@ void read_live_options(const OptionTexts& texts, ViewCommandArguments& view) {
 
 void read_run_options(const OptionTexts& texts, RunArguments& run) {
   read_over_scene(run, run.options, [&] { read_motion_options(texts, run, run.options); });
+  read_accuracy(texts, run.options);
   read_randomize_option(texts, run);
   // with a seed a randomised run finds its masses again
   if (!run.load.empty() && (run.spread || (run.seed && !run.randomization.any()))) {
@@ -212,6 +222,7 @@ void read_scaling_options(const OptionTexts& texts, ScalingArguments& scaling) {
 
 void read_accuracy_options(const OptionTexts& texts, AccuracyArguments& accuracy) {
   read_over_scene(accuracy, accuracy.options, [&] { read_motion_options(texts, accuracy, accuracy.options); });
+  accuracy.options.accuracy.reset();  // all orders and steps are tried
   if (!texts.budget.empty()) accuracy.budget = number_from("--budget", texts.budget, "seconds, such as 60");
 }
 
@@ -236,6 +247,7 @@ void read_view_command_options(const OptionTexts& texts, ViewCommandArguments& v
   }
   view.moves = !texts.duration.empty() || is_scene(view.model) || is_generated_scene(view.model);
   read_run_options(texts, view);
+  view.options.vary = false;  // frames are steps apart
 }
 
 void read_inspect_options(const OptionTexts& texts, InspectArguments& inspect) {

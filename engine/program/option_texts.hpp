@@ -17,7 +17,8 @@ namespace linden {
 /// Options as they were written. Absent ones are empty, so that Options keeps its defaults.
 struct OptionTexts {
   std::string base, duration, dt, gravity, solver, guess, stop, tolerance, order, seed, spread, instances, threads, instructions, every,
-      what, observe, shape, dofs, steps, budget, start, density, randomize, shown, recorded, port, bind, checkpoint_every, keep;
+      what, observe, shape, dofs, steps, budget, start, density, randomize, shown, recorded, port, bind, checkpoint_every, keep,
+      accuracy;
   ViewTexts views;
 };
 

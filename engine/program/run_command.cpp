@@ -26,6 +26,7 @@
 #include "engine/program/start_report.hpp"
 #include "engine/scene/load_model.hpp"
 #include "engine/standard_streams.hpp"
+#include "engine/step_pilot.hpp"
 #include "engine/text.hpp"
 
 namespace linden {
@@ -65,6 +66,40 @@ Outputs checked_outputs(const RunArguments& arguments) {
   return outputs;
 }
 
+/// Between two nodes positions alone are known.
+std::vector<Quantity> recorded_quantities(const RunArguments& arguments, const Simulation& simulation) {
+  if (!simulation.step_lengths()) return arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what;
+  const bool more = !arguments.observe.empty() || std::ranges::any_of(arguments.what, [](Quantity what) { return what != Quantity::positions; });
+  if (more) {
+    throw InputError("--record with --accuracy: where steps vary positions are recorded, between the steps, and nothing else: leave out --observe and what "
+                     "else --what names, or give --dt for fixed steps");
+  }
+  return {Quantity::positions};
+}
+
+/// A run that goes on does so in the steps that it had.
+void take_saved_steps(RunArguments& arguments) {
+  if (arguments.load.empty() || !arguments.options.varies()) return;
+  const Simulation::SavedSteps saved = Simulation::saved_steps(arguments.load);
+  if (saved.vary) return;
+  arguments.options.vary = false;
+  arguments.options.step = saved.step;
+}
+
+/// Chooses fixed or variable steps where an accuracy is asked for and no step is named; says why. simulation: ready to go.
+std::string choose_steps(RunArguments& arguments, std::unique_ptr<Simulation>& simulation, const std::shared_ptr<const Model>& model) {
+  if (!arguments.options.accuracy) return "";
+  if (!arguments.load.empty()) return "as in the run that is continued";
+  if (!arguments.options.varies()) return "the step is given";
+  const StepPilot found = pilot(*simulation, arguments.duration);
+  if (found.vary) return found.why;
+  arguments.options.vary = false;
+  arguments.options.step = found.step;
+  simulation = std::make_unique<Simulation>(model, arguments.options, arguments.effects());
+  begin_run(arguments, *simulation);
+  return found.why;
+}
+
 /// One run from its first sample to its files.
 class RunExecution {
  public:
@@ -77,13 +112,45 @@ class RunExecution {
     figures_.energy = EnergyDrift(steps / figures_.sampled_every + 1);
     if (!act_from_outside(arguments.effects())) figures_.momentum = MomentumDrift::of(simulation);
     if (!arguments.record.empty()) {
-      observer_.emplace(simulation, arguments.what.empty() ? usual_quantities(arguments.record) : arguments.what, arguments.observe);
+      observer_.emplace(simulation, recorded_quantities(arguments, simulation), arguments.observe);
       DrawnArrays arrays(arguments.randomization, simulation.model(), simulation.effects(), 1);
       arrays.set(0, drawn);
       file_.emplace(arguments.record, 1, observer_->arrays(), arrays.arrays());
     }
     if (!arguments.plot.empty() && !(arguments.what.empty() && arguments.observe.empty())) begin_traces();
     if (arguments.views.any()) animator_.emplace(simulation, arguments.views, steps, arguments.observe);
+  }
+
+  /// Variable steps, rows and frames every so many seconds; energy is looked at in every node.
+  void variable_steps(const Interrupt& interrupt, double duration) {
+    const double step = arguments_.options.step, end = figures_.begin + duration;
+    const auto count = [&](double time) { return std::llround((time - figures_.begin) / step); };
+    Progress progress(count(end), step);
+    const auto time_of = [&](std::int64_t steps) { return figures_.begin + static_cast<double>(steps) * step; };
+    constexpr double kAt = 1e-9;  // of a step
+    sample();
+    record_rows(figures_.begin);
+    look();
+    std::int64_t row = arguments_.every;
+    while (simulation_.time() < end - kAt * step && figures_.failure.empty() && figures_.lost.empty() && interrupt.signal() == 0) {
+      const Clock::time_point begin = Clock::now();
+      // what is just beyond the node is one step away; only where rows are to lie within it is its beginning kept
+      const StepsReport report = file_ ? simulation_.advance_to(simulation_.time() + 2 * kAt * simulation_.last_step()) : simulation_.run(1);
+      figures_.run.add(report);
+      if (!report.ok()) figures_.failure = simulation_.describe(report.last);
+      const Clock::time_point now = Clock::now();
+      figures_.step_seconds += seconds(now - begin);
+      figures_.end = simulation_.time();
+      if (!report.ok()) break;
+      sample();
+      for (; time_of(row) <= std::min(simulation_.time(), end + kAt * step); row += arguments_.every) record_rows(time_of(row));
+      if (animator_ && simulation_.time() >= time_of(next_frame_)) {
+        animator_->look();
+        while (simulation_.time() >= time_of(next_frame_)) next_frame_ += animator_->stride();
+      }
+      progress.update(count(simulation_.time()), now);
+    }
+    if (simulation_.time() < end - kAt * step && figures_.lost.empty() && figures_.failure.empty()) figures_.signal = interrupt.signal();
   }
 
   void steps(const Interrupt& interrupt) {
@@ -180,6 +247,16 @@ class RunExecution {
     last_record_ = figures_.run.steps;
   }
 
+  /// Positions at a time between two nodes, and the energy of the later one.
+  void record_rows(double time) {
+    if (!file_ || !figures_.lost.empty()) return;
+    const std::vector<double> positions = simulation_.positions_at(time);
+    const std::span<const double> row(positions);
+    const double total = simulation_.energy().total();
+    const auto status = static_cast<std::uint8_t>(figures_.run.last.status);
+    recording([&] { file_->add(time, {&row, 1}, {&total, 1}, {&status, 1}); });
+  }
+
   /// Of this run; that of a run which it continues is in the checkpoint.
   EffectWork work_since_begin() const {
     EffectWork work = simulation_.effect_work();
@@ -194,7 +271,7 @@ class RunExecution {
     figures_.given = work.given();
     figures_.energy.add(simulation_.time(), energy, figures_.taken, figures_.given);
     if (figures_.momentum) figures_.momentum->add(simulation_, energy);
-    if (figures_.run.steps % arguments_.every == 0) record(energy);
+    if (!simulation_.step_lengths() && figures_.run.steps % arguments_.every == 0) record(energy);
     if (!figures_.traces.empty()) {
       const auto numbers = observer_->look();
       for (std::size_t k = 0; k < figures_.traces.size(); ++k) {
@@ -243,19 +320,20 @@ class RunExecution {
 std::string ending(const RunExecution& run, const RunFigures& figures, const Options& options) {
   const std::int64_t done = figures.run.steps;
   const double time = figures.begin + figures.simulated(options.step);
+  const std::string planned = figures.end ? counted(done, "step") : fmt::format("{} of {} steps", grouped(done), grouped(figures.steps_planned));
   const std::string files = run.written().empty() ? "" : fmt::format("; {} {} valid up to there", fmt::join(run.written(), ", "),
                                                                      run.written().size() == 1 ? "is" : "are");
   if (figures.signal != 0) {
-    return fmt::format("interrupted at {:.6g} s, after {} of {} steps{}", time, grouped(done), grouped(figures.steps_planned), files);
+    return fmt::format("interrupted at {:.6g} s, after {}{}", time, planned, files);
   }
   if (figures.failure.empty()) {
     const std::string kept = figures.rows > 0 ? fmt::format("it holds {}", counted(figures.rows, "row"))
                                               : "no row of it is kept";
-    return fmt::format("{}; {}; the run ended at {:.6g} s, after {} of {} steps", figures.lost, kept, time, grouped(done),
-                       grouped(figures.steps_planned));
+    return fmt::format("{}; {}; the run ended at {:.6g} s, after {}", figures.lost, kept, time, planned);
   }
-  return fmt::format("the run failed in step {} of {}: {}; the last good state is that at {:.6g} s{}", grouped(done + 1),
-                     grouped(figures.steps_planned), figures.failure, time, files);
+  return fmt::format("the run failed in step {}: {}; the last good state is that at {:.6g} s{}",
+                     figures.end ? grouped(done + 1) : fmt::format("{} of {}", grouped(done + 1), grouped(figures.steps_planned)), figures.failure, time,
+                     files);
 }
 
 }  // namespace
@@ -264,21 +342,29 @@ int run_command(const RunArguments& given) {
   const Clock::time_point begin = Clock::now();
   RunArguments arguments = given;
   check(arguments.options);
-  const std::int64_t steps = step_count(arguments, arguments.options.step);
+  (void)step_count(arguments, arguments.options.step);  // looks at the duration
   const Outputs outputs = checked_outputs(arguments);
 
   std::shared_ptr<const Model> model = arguments.loaded(outputs);
   print_warnings(*model);
-  check_views(arguments.views, *model, static_cast<double>(steps) * arguments.options.step);
+  check_views(arguments.views, *model, arguments.duration);
   const DrawnNumbers drawn = randomize(arguments, model);
   if (arguments.load.empty()) look_at_start(arguments, *model, arguments.options);
-  Simulation simulation(model, arguments.options, arguments.effects());
-  begin_run(arguments, simulation);
+  take_saved_steps(arguments);
+  auto ready = std::make_unique<Simulation>(model, arguments.options, arguments.effects());
+  begin_run(arguments, *ready);
+  const std::string why = choose_steps(arguments, ready, model);
+  Simulation& simulation = *ready;
 
   const Interrupt interrupt;
-  RunExecution run(arguments, simulation, steps, drawn);
-  run.steps(interrupt);
+  RunExecution run(arguments, simulation, step_count(arguments, arguments.options.step), drawn);
   RunFigures& figures = run.figures();
+  figures.steps_why = why;
+  if (arguments.options.varies()) {
+    run.variable_steps(interrupt, arguments.duration);
+  } else {
+    run.steps(interrupt);
+  }
   figures.total_seconds = seconds(Clock::now() - begin);
   const bool written = run.write_files();
   say_text(run_summary(arguments, simulation, figures));

@@ -36,9 +36,44 @@ std::string order_text(const Options& options) {
   return fmt::format("order {} ({} sub-steps), ", options.order, composition(options.order).size());
 }
 
+/// "step 0.001 s"; "variable steps".
+std::string step_text(const Options& options) { return options.varies() ? "variable steps" : fmt::format("step {:g} s", options.step); }
+
+double band(const EnergyDrift& energy) { return energy.scale() > 0 ? energy.band() / energy.scale() : 0; }
+
+/// Of an accuracy: what steps it was met with, and whether it was.
+std::string steps_text(const Simulation& simulation, const RunFigures& figures) {
+  if (const std::optional<StepLengths> lengths = simulation.step_lengths()) {
+    std::string text = fmt::format("variable, {:.3g} to {:.3g} s, mean {:.3g} s: {}", lengths->shortest, lengths->longest, lengths->mean, figures.steps_why);
+    if (lengths->lowered > 0) text += fmt::format("; made shorter for good {}", lengths->lowered == 1 ? "once" : fmt::format("{} times", lengths->lowered));
+    if (lengths->retaken > 0) text += fmt::format("; {} taken again, shorter", counted(lengths->retaken, "step"));
+    return text;
+  }
+  return fmt::format("fixed: {}", figures.steps_why);
+}
+
+std::string accuracy_text(const Options& options, const EnergyDrift& energy) {
+  return fmt::format("{:g} asked for, band {:.1e}: {}", *options.accuracy, band(energy), band(energy) <= *options.accuracy ? "kept" : "not kept");
+}
+
 /// " or 1e-05 of the first residual"; where there is none, nothing.
 std::string reduction_text(const Options& options) {
   return options.reduction > 0 ? fmt::format(" or {:g} of the first residual", options.reduction) : "";
+}
+
+nlohmann::ordered_json accuracy_json(const Simulation& simulation, const RunFigures& figures) {
+  nlohmann::ordered_json json{{"asked", *simulation.options().accuracy},
+                              {"kept", band(figures.energy) <= *simulation.options().accuracy},
+                              {"varies", simulation.options().varies()},
+                              {"why", figures.steps_why}};
+  if (const std::optional<StepLengths> lengths = simulation.step_lengths()) {
+    json["shortest"] = lengths->shortest;
+    json["longest"] = lengths->longest;
+    json["mean"] = lengths->mean;
+    json["retaken"] = lengths->retaken;
+    json["lowered"] = lengths->lowered;
+  }
+  return json;
 }
 
 }  // namespace
@@ -82,14 +117,16 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   if (const std::string ignored = IgnoredByScene(model, effects).text(); !ignored.empty()) {
     row("ignored", ignored + "; a scene can name them");
   }
-  row("method", fmt::format("{}, {}step {:g} s, tolerance {:g} ({}){}, first guess {}, {}", name(options.solver), order_text(options),
-                            options.step, options.tolerance, name(options.stop), reduction_text(options), name(options.guess),
+  row("method", fmt::format("{}, {}{}, tolerance {:g} ({}){}, first guess {}, {}", name(options.solver), order_text(options),
+                            step_text(options), options.tolerance, name(options.stop), reduction_text(options), name(options.guess),
                             gravity_text(options)));
   if (figures.run.steps == 0) return text;
+  if (options.accuracy) row("steps", steps_text(simulation, figures));
 
   const double simulated = figures.simulated(options.step);
   row("run", figures.complete()
                  ? fmt::format("{:.6g} s, {}", simulated, counted(figures.run.steps, "step"))
+             : figures.end ? fmt::format("{:.6g} of {:.6g} s, {}", simulated, arguments.duration, counted(figures.run.steps, "step"))
                  : fmt::format("{:.6g} of {:.6g} s, {} of {}", simulated, static_cast<double>(figures.steps_planned) * options.step,
                                grouped(figures.run.steps), counted(figures.steps_planned, "step")));
   row("speed", fmt::format("{} steps/s, {:.0f} ns per body and step, {:.3g} times real time",
@@ -113,6 +150,7 @@ std::string run_summary(const RunArguments& arguments, const Simulation& simulat
   const bool scaled = energy.scale() > 0;
   row("  band", fmt::format("{:.2e} J{}", energy.band(),
                             scaled ? fmt::format(" = {:.2e} of the largest kinetic energy", energy.band() / energy.scale()) : ""));
+  if (options.accuracy) row("  accuracy", accuracy_text(options, energy));
   if (std::isfinite(energy.slope_error())) {
     row("  slope", fmt::format("{:+.1e} \u00b1 {:.1e} J/s{}", energy.slope(), energy.slope_error(),
                                scaled ? fmt::format(" = {:+.1e} \u00b1 {:.1e} of it per second", energy.slope() / energy.scale(),
@@ -175,6 +213,7 @@ nlohmann::ordered_json run_json(const RunArguments& arguments, const Simulation&
       {"reduction", options.reduction},
       {"order", options.order},
       {"step", options.step},
+      {"accuracy", options.accuracy ? accuracy_json(simulation, figures) : Json(nullptr)},
       {"gravity", options.gravity},
       {"seed", random ? Json(random->seed) : Json(nullptr)},
       {"spread", random ? Json(random->spread) : Json(nullptr)},
@@ -239,9 +278,9 @@ plot::Chart energy_chart(const RunArguments& arguments, const Simulation& simula
   }
   plot::Chart chart;
   chart.title = fmt::format("Energy drift of {}", printable(simulation.model().names.model));
-  chart.subtitle = fmt::format("{}, {}; {}, {}step {:g} s, {}, {}; start {}; H(0) = {:.6g} J",
+  chart.subtitle = fmt::format("{}, {}; {}, {}{}, {}, {}; start {}; H(0) = {:.6g} J",
                                counted(simulation.model().tree.bodies(), "body"), base_of(simulation.model()), name(options.solver),
-                               order_text(options), options.step, counted(figures.run.steps, "step"), gravity_text(options), begin_text(arguments, figures),
+                               order_text(options), step_text(options), counted(figures.run.steps, "step"), gravity_text(options), begin_text(arguments, figures),
                                energy.initial());
   if (scaled && std::isfinite(energy.slope_error())) {
     chart.subtitle += fmt::format("; slope {:+.1e} \u00b1 {:.1e} per second", energy.slope() / energy.scale(), energy.slope_error() / energy.scale());

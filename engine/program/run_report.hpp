@@ -30,6 +30,8 @@ struct RunFigures {
   StepsReport run;
   std::int64_t sampled_every = 1;  // steps between samples of energy and momentum
   double begin = 0;                // time at the first sample [s]
+  std::optional<double> end;       // where steps vary: time at the last one [s]
+  std::string steps_why;           // what variable steps, or none, were chosen by; empty where no accuracy was asked for
   double step_seconds = 0;         // by the clock, within Simulation::run
   double total_seconds = 0;        // by the clock, everything
   EnergyDrift energy;          // of H plus what effects took less what they gave
@@ -44,7 +46,7 @@ struct RunFigures {
   std::string lost;                // why the recording ended early, and the run with it
 
   bool complete() const { return failure.empty() && signal == 0 && lost.empty(); }
-  double simulated(double step) const { return static_cast<double>(run.steps) * step; }
+  double simulated(double step) const { return end ? *end - begin : static_cast<double>(run.steps) * step; }
 };
 
 /// What to say of a run whose motion cannot be trusted: passive effects that gave energy, each by name; or energy that strays far. None for

@@ -54,6 +54,16 @@ void bind_errors(nb::module_& m) {
                            self.evaluations, self.residual);
       });
 
+  nb::class_<StepLengths>(m, "StepLengths", "Variable steps since the last start, and the accuracy that they were chosen for.")
+      .def_ro("steps", &StepLengths::steps)
+      .def_ro("shortest", &StepLengths::shortest, "[s]")
+      .def_ro("longest", &StepLengths::longest, "[s]")
+      .def_ro("mean", &StepLengths::mean, "[s]")
+      .def_ro("retaken", &StepLengths::retaken, "Steps that failed and were taken again, shorter.")
+      .def_ro("accuracy", &StepLengths::accuracy, "Asked for.")
+      .def_ro("strayed", &StepLengths::strayed, "Band of the energy so far, over the largest kinetic energy.")
+      .def_ro("lowered", &StepLengths::lowered, "Times that steps were made shorter for good because it strayed further.")
+      .def_prop_ro("kept", &StepLengths::kept, "Whether the band is within the accuracy.");
   nb::class_<StepsReport>(m, "StepsReport", "What several steps took together. The one that failed is not counted.")
       .def_ro("steps", &StepsReport::steps)
       .def_prop_ro("ok", &StepsReport::ok, "Whether all of them were taken.")

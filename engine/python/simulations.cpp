@@ -7,6 +7,8 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "engine/python/bindings.hpp"
 #include "engine/python/numbers.hpp"
@@ -31,17 +33,34 @@ StepReport step(PySimulation& self) {
   return report;
 }
 
+constexpr double kBodiesASecond = 1e5;  // or more
+
 StepsReport run(PySimulation& self, std::int64_t steps) {
   if (steps < 0) throw InputError("steps: " + std::to_string(steps) + " are asked for; expected zero or more");
   Simulation& simulation = self.to_change();
   const InUse::Hold hold(self.in_use());
   StepsReport total;
-  constexpr double kBodiesASecond = 1e5;  // or more
   const auto first = static_cast<std::int64_t>(kPart * kBodiesASecond / simulation.model().tree.bodies());
   in_parts(steps, first, [&](std::int64_t part) {
     const StepsReport report = simulation.run(part);
     total.add(report);
     return report.ok();
+  });
+  if (!total.ok()) raise_step_error(simulation.describe(total.last), nb::cast(total));
+  return total;
+}
+
+StepsReport advance_to(PySimulation& self, double t) {
+  Simulation& simulation = self.to_change();
+  const InUse::Hold hold(self.in_use());
+  if (!std::isfinite(t)) return simulation.advance_to(t);  // which refuses it
+  StepsReport total;
+  const auto first = static_cast<std::int64_t>(kPart * kBodiesASecond / simulation.model().tree.bodies());
+  in_parts(std::numeric_limits<std::int64_t>::max(), first, [&](std::int64_t part) {
+    // so many steps, about: the motion is the same wherever it is stopped
+    const StepsReport report = simulation.advance_to(std::min(t, simulation.time() + static_cast<double>(part) * simulation.last_step()));
+    total.add(report);
+    return report.ok() && report.steps > 0;
   });
   if (!total.ok()) raise_step_error(simulation.describe(total.last), nb::cast(total));
   return total;
@@ -188,6 +207,9 @@ void bind_contact(nb::module_& m) {
       .def_prop_ro(
           "force", [three](const Contact& self) { return three(self.point.force); },
           "On the body, friction with it, mean over the step [3; N].")
+      .def_prop_ro(
+          "moment", [three](const Contact& self) { return three(self.point.moment); },
+          "Likewise, against rolling and spinning, beside that of the force at its place [3; N m].")
       .def("__repr__", [](const Contact& self) {
         const auto& p = self.point.place;
         const auto& f = self.point.force;
@@ -226,6 +248,11 @@ void bind_state(nb::class_<PySimulation>& c) {
           "time", [](PySimulation& self) { return self.look().time(); }, "[s]")
       .def_prop_ro(
           "steps", [](PySimulation& self) { return self.look().steps(); }, "Taken since the start.")
+      .def_prop_ro(
+          "last_step", [](PySimulation& self) { return self.look().last_step(); }, "Length of the step taken last, or of the first to come [s].")
+      .def_prop_ro(
+          "step_lengths", [](PySimulation& self) { return self.look().step_lengths(); },
+          "How long steps were and what became of the accuracy asked for; None where steps do not vary.")
       .def_prop_rw(
           "q", [](PySimulation& self) { return fixed_array(self.look().positions()); },
           [](PySimulation& self, nb::handle value) {
@@ -314,6 +341,14 @@ void bind_controls(nb::class_<PySimulation>& c) {
 /// In time: steps, what acted in the last one, checkpoints.
 void bind_steps(nb::class_<PySimulation>& c) {
   c.def("step", &step, "One step. Raises StepError, and leaves the state as it was, where it cannot be taken.")
+      .def("advance_to", &advance_to, "t"_a,
+           "Steps to the first node at or past t [s]; none where it is there already. Where steps vary too a motion has the same bits wherever it is "
+           "stopped: t ends no step. Raises StepError as step does.")
+      .def(
+          "positions_at", [](PySimulation& self, double t) { return fixed_array(self.ask([&](Simulation& simulation) { return simulation.positions_at(t); })); },
+          "t"_a,
+          "Positions [nq] at a time within the last step of advance_to [s], by the cubic through positions and velocities at its ends. Raises InputError for "
+          "other times.")
       .def("run", &run, "steps"_a,
            "So many steps. Raises StepError at the one that cannot be taken; KeyboardInterrupt ends it between two steps.")
       .def(

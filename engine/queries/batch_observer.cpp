@@ -63,6 +63,7 @@ std::span<const Real> BatchObserver<Real>::observe(const Block<Real>& block, Blo
                       .time = time_.data(),
                       .energy = energy_.data(),
                       .mass = block.mass,
+                      .contacts = block.contacts,
                       .gravity = block.gravity},
                      rows_.data());
   return rows_;

@@ -22,6 +22,7 @@ struct ObservedBlock {
   const Real* time = nullptr;     // [1]
   const Real* energy = nullptr;   // [2]
   const Real* mass = nullptr;     // [slots x kMassRows] of each instance (engine/solve/block_stepper.hpp); null: the model's
+  const double* contacts = nullptr;  // [numbers] what contacts of bodies with each other remember (engine/sweeps/body_contacts.hpp)
   const Real* gravity = nullptr;  // [3] of each instance [m/s^2]; null: that of the setup
 };
 

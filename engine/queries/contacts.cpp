@@ -2,6 +2,7 @@
 #include "engine/effects/effect_plan.hpp"
 #include "engine/queries/link_frames.hpp"
 #include "engine/simulation.hpp"
+#include "engine/solve/stepper.hpp"
 #include "layout/support/input_error.hpp"
 
 namespace linden {
@@ -20,6 +21,8 @@ std::vector<double> Simulation::body_wrenches() const {
   return wrenches;
 }
 
+std::span<const double> Simulation::contact_memory() { return stepper_->contact_memory(); }
+
 std::vector<ContactPoint> Simulation::contact_points() const {
   const StepImpulses& impulses = kept(impulses_);
   const Kinematics now(*model_, positions());
@@ -30,14 +33,15 @@ std::vector<ContactPoint> Simulation::contact_points() const {
     const Index slot = plan_->ground.points[k].slot;
     const auto T = linden::load<Placement, double>(now.bodies().pose, slot);
     points.push_back({slot, array_of(T.p + T.R * three(impulses.places, k)), array_of(three(impulses.normals, k)),
-                      array_of(three(impulses.pushes, k) / options_.step)});
+                      array_of(three(impulses.pushes, k) / last_step())});
   }
   for (const TouchImpulse& touch : impulses.touches) {
     const bool on_b = touch.slot_b != 0;  // what is fixed to the world pushes, and is not pushed
-    const double sign = (on_b ? 1 : -1) / options_.step;
-    ContactPoint& point = points.emplace_back(ContactPoint{on_b ? touch.slot_b : touch.slot_a, touch.place, touch.normal, touch.impulse});
+    const double sign = (on_b ? 1 : -1) / last_step();
+    ContactPoint& point = points.emplace_back(ContactPoint{on_b ? touch.slot_b : touch.slot_a, touch.place, touch.normal, touch.impulse, touch.moment});
     for (std::size_t k = 0; k < 3; ++k) {
       point.force[k] *= sign;
+      point.moment[k] *= sign;
       if (!on_b) point.normal[k] = -point.normal[k];
     }
     point.other = on_b ? touch.slot_a : touch.slot_b;

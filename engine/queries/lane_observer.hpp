@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
 #include "engine/queries/block_observer.hpp"
 #include "kernels/block/lane_constants.hpp"
@@ -77,11 +78,11 @@ class LaneObserver final : public BlockObserver<typename ElementOf<Pack>::type> 
       case Look::momentum:
         put(total_.momentum.n, to);
         return put(total_.momentum.f, to + 3 * W);
-      default: return read_link(look, to);
+      default: return read_link(block, look, to);
     }
   }
 
-  void read_link(const ScheduledLook& look, Real* to) {
+  void read_link(const ObservedBlock<Real>& block, const ScheduledLook& look, Real* to) {
     const Index i = look.link.slot;
     const Placement<Pack> link = spread(look.link.in_body);
     const auto T = load<Placement, Pack>(motions_.pose, i);
@@ -93,7 +94,12 @@ class LaneObserver final : public BlockObserver<typename ElementOf<Pack>::type> 
       case Look::position: return put(T.p + T.R * link.p, to);
       case Look::quaternion: return put(quaternion_of(R), to);
       case Look::contact: {
-        const GroundPush<Pack> push = ground_push_map(schedule_.ground, i, load<Twist, Pack>(motions_.twist, i), points_);
+        GroundPush<Pack> push = ground_push_map(schedule_.ground, i, load<Twist, Pack>(motions_.twist, i), points_);
+        for (const ObservationSchedule::Load& of_shape : schedule_.loads) {
+          if (of_shape.slot != i || block.contacts == nullptr) continue;
+          push.points = push.points + remembered(block.contacts + of_shape.number * W);
+          push.force = push.force + remembered(block.contacts + (of_shape.number + 1) * W);
+        }
         L::store(push.points, to);
         return L::store(push.force, to + W);
       }
@@ -115,6 +121,11 @@ class LaneObserver final : public BlockObserver<typename ElementOf<Pack>::type> 
     Pack rotation[9];
     for (std::size_t k = 0; k < 9; ++k) rotation[k] = as<Pack>(pose.rotation[k]);
     return {Mat3<Pack>::from(rotation), spread3<Pack>(pose.shift)};
+  }
+  static Pack remembered(const double* row) {
+    alignas(kAlignment) std::array<Real, W> each;
+    for (std::size_t l = 0; l < W; ++l) each[l] = static_cast<Real>(row[l]);
+    return L::load(each.data());
   }
   static void put(const Vec3<Pack>& a, Real* to) {
     L::store(a.x, to);

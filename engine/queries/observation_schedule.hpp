@@ -40,6 +40,11 @@ struct ObservationSchedule {
   std::vector<Index> slots;                 // these bodies, in order
   bool totals = false, momenta = false;     // sums over all bodies
   GroundPlan ground;                        // points of the bodies asked for; none where no contact is
+  struct Load {
+    Index slot;
+    std::size_t number;  // of what contacts remember, the first of two (remembered_load in engine/sweeps/body_contacts.hpp)
+  };
+  std::vector<Load> loads;                  // of shapes of the bodies asked for that other bodies may touch
 };
 
 }  // namespace linden

@@ -10,6 +10,7 @@
 #include "engine/effects/effect_plan.hpp"
 #include "engine/queries/block_observer.hpp"
 #include "engine/simulation.hpp"
+#include "engine/sweeps/body_contacts.hpp"
 #include "layout/support/input_error.hpp"
 #include "layout/support/words.hpp"
 
@@ -117,7 +118,7 @@ class Compiler {
     for (Index i = 1; i < model_.tree.shape.slots; ++i) {
       if (followed[static_cast<std::size_t>(i)]) schedule_.slots.push_back(i);
     }
-    keep_ground();
+    keep_contacts();
     return std::make_shared<const ObservationSchedule>(std::move(schedule_));
   }
 
@@ -185,8 +186,8 @@ class Compiler {
       case Look::position:
       case Look::quaternion: at_least(MotionDepth::poses); break;
       case Look::contact:
-        if (!effects_.ground) {
-          throw InputError(fmt::format("observation {}: there is no ground; expected one among the effects", quoted(name)));
+        if (!effects_.ground && !effects_.contact) {
+          throw InputError(fmt::format("observation {}: there is no ground, and bodies do not touch each other; expected ground or contact among the effects", quoted(name)));
         }
         at_least(MotionDepth::twists);
         break;
@@ -196,13 +197,17 @@ class Compiler {
     }
   }
 
-  /// The ground's points on the bodies that are asked for.
-  void keep_ground() {
+  /// The ground's points, and the shapes, of the bodies that are asked for.
+  void keep_contacts() {
     const auto asked = [&](Index slot) {
       return std::ranges::any_of(schedule_.looks,
                                  [&](const ScheduledLook& look) { return look.what == Look::contact && look.link.slot == slot; });
     };
     if (std::ranges::find(schedule_.looks, Look::contact, &ScheduledLook::what) == schedule_.looks.end()) return;
+    for (std::size_t shape = 0; effects_.contact && shape < effects_.contact->shapes.size(); ++shape) {
+      const Index slot = effects_.contact->shapes[shape].slot;
+      if (asked(slot)) schedule_.loads.push_back({slot, remembered_load(effects_.contact->shapes.size()) + 2 * shape});
+    }
     Effects alone;
     alone.ground = effects_.ground;
     schedule_.ground = EffectPlan(model_, {}, alone).ground;
@@ -262,7 +267,7 @@ void Observations::observe(Simulation& simulation, std::span<double> to) {
     energy = {now.kinetic, now.potential};
   }
   observer_->observe({.q = simulation.positions().data(), .v = v.data(), .a = a.data(), .p = simulation.momenta().data(),
-                      .targets = targets.data(), .time = &time, .energy = energy.data()},
+                      .targets = targets.data(), .time = &time, .energy = energy.data(), .contacts = simulation.contact_memory().data()},
                      to.data());
 }
 

@@ -25,8 +25,9 @@
 //   twist:L               6       angular and linear velocity of its origin, in the world's directions
 //   acceleration:L        6       the same of acceleration
 //   imu:L                 6       angular velocity and specific force, in the link's frame (engine/queries/imu.hpp)
-//   contact:L             2       of the body that holds L: contact points in the ground; normal force of all of them [N], which the law of
-//                                 the ground gives where the body is and as fast as it is (Simulation::contacts has the mean over a step)
+//   contact:L             2       of the body that holds L: contact points in the ground, and places where another body or what stands in the world
+//                                 pushes it; normal force of all of them [N]: of the ground what its law gives where the body is and as fast as it is
+//                                 (Simulation::contacts has the mean over a step), of bodies the mean over the step taken last
 //
 // Numbers of a Batch equal those of a Simulation in the same state to rounding.
 #pragma once

@@ -29,7 +29,7 @@ inline constexpr StopTest kLastOf<StopTest> = StopTest::absolute;
 namespace {
 
 constexpr std::string_view kModelLine = "linden model 4\n", kAnyModel = "linden model ";
-constexpr std::string_view kSceneLine = "linden scene 4\n", kAnyScene = "linden scene ";
+constexpr std::string_view kSceneLine = "linden scene 5\n", kAnyScene = "linden scene ";
 
 template <class T>
 std::string bytes_of(const T& value) {

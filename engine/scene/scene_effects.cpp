@@ -50,8 +50,9 @@ const std::vector<std::string> kDrag{"linear", "quadratic", "wind", "bodies"};
 const std::vector<std::string> kBodyDrag{"linear", "quadratic"};
 const std::vector<std::string> kTerrain{"file", "spacing", "origin"};
 const std::vector<std::string> kGround{"normal", "height", "stiffness", "damping", "friction", "terrain"};
-const std::vector<std::string> kContact{"stiffness", "damping", "friction", "restitution", "between", "pairs", "except", "srdf"};
-const std::vector<std::string> kBetweenKeys{"links", "stiffness", "damping", "friction", "restitution"};
+const std::vector<std::string> kContact{"stiffness",          "damping", "friction", "restitution", "rolling_friction",
+                                        "torsional_friction", "between", "pairs",    "except",      "srdf"};
+const std::vector<std::string> kBetweenKeys{"links", "stiffness", "damping", "friction", "restitution", "rolling_friction", "torsional_friction"};
 
 /// By which a curve may round beyond a limit that one of its points lies on [rad, m].
 constexpr double kCurveRounding = 1e-9;
@@ -374,6 +375,8 @@ class EffectsReader {
     if (const auto value = at.find("damping")) material.damping = value->not_negative();
     if (const auto value = at.find("friction")) material.friction = value->not_negative();
     if (const auto value = at.find("restitution")) material.restitution = restitution_of(*value);
+    if (const auto value = at.find("rolling_friction")) material.rolling_friction = value->not_negative();
+    if (const auto value = at.find("torsional_friction")) material.torsional_friction = value->not_negative();
   }
 
   /// Values of what touches between two links, or of all that touches one, over those of entries before.

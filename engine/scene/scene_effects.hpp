@@ -15,7 +15,8 @@
 //   wrench     {link: {force, moment, point, frame: world | body, from, to, file}, or a list of such}
 //   drag       {linear, quadratic, wind, bodies: {link: {linear, quadratic}}}
 //   ground     {normal, height, stiffness, damping, friction, terrain: {file, spacing, origin}}
-//   contact    {stiffness, friction, pairs: [[link, link], ...], or except: likewise, srdf: FILE}
+//   contact    {stiffness, damping, friction, restitution, rolling_friction, torsional_friction, between: [{links, those}],
+//               pairs: [[link, link], ...], or except: likewise, srdf: FILE}
 //
 // A servo acts on every screw joint; on those that `joints` names where it is a list, or a map without a `stiffness` beside it. Targets
 // are the positions at the start where none are given; a target that moves has no velocity but the one given for it. Limits of velocity

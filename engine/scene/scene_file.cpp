@@ -31,7 +31,7 @@ using Kind = SceneValue::Kind;
 
 const std::vector<std::string> kScene{"model", "models",    "base", "step",           "duration",   "solver",  "order",
                                       "guess", "tolerance", "stop", "max_iterations", "max_splits", "initial", "start",  "effects",
-                                      "inertia", "randomize", "couplings", "assemble", "world"};
+                                      "inertia", "randomize", "couplings", "assemble", "world", "accuracy"};
 const std::vector<std::string> kModel{"model",    "base",       "name",     "parent", "position",
                                       "rotation", "quaternion", "velocity", "angular_velocity", "inertia"};
 const std::vector<std::string> kBases{"fixed", "floating"};
@@ -379,7 +379,11 @@ class SceneReader {
     Options& options = scene_.options;
     bool tolerance = false;
     for (const auto& [key, value] : root_.entries("a scene")) {
-      if (key == "step") options.step = value.positive();
+      if (key == "step") read_step(value);
+      if (key == "accuracy") {
+        options.accuracy = value.positive();
+        value.located([&] { check_accuracy(options); });
+      }
       if (key == "duration") scene_.duration = value.positive();
       if (key == "tolerance") {
         options.tolerance = value.positive();
@@ -399,9 +403,19 @@ class SceneReader {
       }
     }
     if (!tolerance) use_default_tolerance(options);
+    options.vary = !options.accuracy || !root_.find("step") || root_.find("step")->says("auto");
     if (scene_.duration < options.step) {
       root_.fail(fmt::format("a duration of {} s is less than a step of {} s", scene_.duration, options.step), "one step or more",
                  "change one of them");
+    }
+  }
+
+  /// With an accuracy it may be auto, which is what it is where it is not named.
+  void read_step(const SceneValue& value) {
+    if (!value.says("auto")) {
+      scene_.options.step = value.positive();
+    } else if (!root_.find("accuracy")) {
+      value.fail("the step is auto, and no accuracy is named", "accuracy: 1e-6, or another, beside it", "steps are chosen for an accuracy");
     }
   }
 

@@ -12,6 +12,7 @@
 #include "kernels/tree/largest_turn.hpp"
 #include "kernels/values/lanes_of.hpp"
 #include "kernels/values/scalar.hpp"
+#include "layout/model.hpp"
 
 namespace linden {
 
@@ -40,16 +41,29 @@ inline constexpr double kSettled = 1e-4;
 inline constexpr double kRoughGuess = 1e-2;
 
 /// The equation of a step may have other roots, of the order of a radian away, once a step turns bodies by something of that order. Where
-/// no body turns by more than kFreeTurn, or no joint had to be corrected from the first guess by more than kFreeCorrection, there is
-/// none to fear. Measured over the steps that landed on another root (chains of 10 and 100 links at 2 to 10 ms, ball joints; 196
+/// no body turns by more than `turn`, or no joint had to be corrected from the first guess by more than `correction`, there is none to fear.
+struct NoOtherRoot {
+  double cosine;      // of half of the turn
+  double correction;  // [rad]
+};
+
+/// Turns of 0.1 rad. Measured over the steps that landed on another root (chains of 10 and 100 links at 2 to 10 ms, ball joints; 196
 /// steps): turn 0.5 rad or more, correction 0.23 or more; of things that come to rest, are pushed or held: 4e-10 and 2e-6 at most.
-inline constexpr double kFreeTurn = 0.1, kFreeCorrection = 0.05;  // [rad]
-inline constexpr double kFreeCosine = 0.99875026;                 // of half of kFreeTurn
+inline constexpr NoOtherRoot kOfTree{0.99875026, 0.05};
+
+/// Turns of 0.01 rad: rows of couplings turn the faster the nearer a mechanism is to where it can go no further.
+inline constexpr NoOtherRoot kOfMechanism{0.9999875, 0.005};
 
 /// Beyond both a step is asked for its energies, and may gain this share of the kinetic energy beyond the work of the impulses between it
 /// and the step before: what second order leaves where a motion is barely resolved. On ten-link chains whipping at 4 to 6 ms steps
 /// gain 0.02 to 0.12 at most; second roots, met from 8 ms on, 0.77 and more.
 inline constexpr double kMostGain = 0.25;
+
+/// Couplings may work by this share of the kinetic energy, and of their own, beside what their gaps change by: third order where steps follow how
+/// they turn. Rigid ones are asked where energies are: a ball whipped round by a cable gained a thousand times its energy in a few steps. A bushing
+/// whose pitch comes near a right angle, where roll and yaw are one and turn the faster the nearer it is, gave ten times the energy of its scene in
+/// a step, and half of it where a quarter was allowed.
+inline constexpr double kMostStray = 0.01;
 
 /// A row of a coupling that others hold already is watched: it may open by this share of the size of its mechanism, ten times what axes may be
 /// off that are taken for parallel (kernels/couplings/masked_solve.hpp). Beyond that the bodies cannot go where they are sent.
@@ -110,14 +124,17 @@ auto is_rounding(const S& norm, const S& sum, double epsilons) {
   return norm <= as<S>(unit * unit) * sum;
 }
 
+/// By which of them a model is judged.
+inline const NoOtherRoot& no_other_root(const Model& model) { return model.couplings.empty() ? kOfTree : kOfMechanism; }
+
 /// Whether a solution may be another root than the motion's: least_w and delta of the solution, guess(row) of what it was found from.
 template <class S, class Element, class Guess>
-Lanes may_be_another_root(const Tree& tree, const BodyConstants<Element>& constants, Lanes asked, const S& least_w, const Field<S>& delta,
-                          const Guess& guess) {
+Lanes may_be_another_root(const NoOtherRoot& bounds, const Tree& tree, const BodyConstants<Element>& constants, Lanes asked, const S& least_w,
+                          const Field<S>& delta, const Guess& guess) {
   using L = LanesOf<S>;
-  asked &= L::bits(least_w <= as<S>(kFreeCosine));
+  asked &= L::bits(least_w <= as<S>(bounds.cosine));
   if (asked == 0) return 0;
-  return asked & L::bits(largest_turn(tree, constants, delta, guess) >= as<S>(kFreeCorrection));
+  return asked & L::bits(largest_turn(tree, constants, delta, guess) >= as<S>(bounds.correction));
 }
 
 }  // namespace linden

@@ -167,8 +167,8 @@ class LaneStepper final : public BlockStepper<typename ElementOf<Pack>::type> {
     solved.evaluations.each(alive, [&](int l, int evaluations) { block.instances[l].evaluations += evaluations; });
     sweeps_.factor().made().each(alive, [&](int l, int factors) { block.instances[l].factors += static_cast<std::uint32_t>(factors); });
     displacement_map(tree_, work_.motion, work_.delta);
-    return solved.done & ~may_be_another_root(tree_, sweeps_.constants(), solved.done & extrapolates, solved.least_w, work_.delta,
-                                              [&](Index row) { return extrapolated(past, row); });
+    return solved.done & ~may_be_another_root(no_other_root(model_), tree_, sweeps_.constants(), solved.done & extrapolates, solved.least_w,
+                                              work_.delta, [&](Index row) { return extrapolated(past, row); });
   }
 
   /// Where a step of sub-steps begins.

@@ -10,7 +10,7 @@
 //   converged(now), close(now)                  lanes whose residual is below the tolerance; nearly so
 //   at_floor(now, epsilons)                     lanes whose residual is rounding alone
 //   has_states(), update_states(update)              effects that stick, stop or saturate: lanes in which a state changed
-//   refused(lanes)                              of lanes that are solved those that cannot take the step in one
+//   refused(lanes, now)                         of lanes that are solved those that cannot take the step in one
 //   put_aside(done, before, active)                these lanes are solved, those were before, others go on with what all share
 //   and alone: first_correction(now, before, floor), told once what the first correction left; stale(now, before), whether the factor that
 //   was held for it will not do; cut(share), take_back(share), refactor(now), continuation(now, whole), give_up(seen)
@@ -51,7 +51,7 @@ class Solve {
     if (!policy_.judges_guess) correct(active, active, solved);
     for (;;) {
       std::array<Lanes, kNexts> next = decided(active);
-      const Lanes refused = sweeps_.refused(lanes_to(next, Next::accept));
+      const Lanes refused = sweeps_.refused(lanes_to(next, Next::accept), now_);
       const Lanes done = lanes_to(next, Next::accept) & ~refused, lost = lanes_to(next, Next::give_up) | refused;
       solved.least_w = select(L::mask(done), now_.least_w, solved.least_w);
       solved.done |= done;

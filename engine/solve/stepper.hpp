@@ -51,11 +51,16 @@ class Stepper {
   virtual void forget() = 0;
 
   /// One step of `h` seconds, `time` at its beginning; back in time where h < 0 (no effect may dissipate or depend on time then).
-  /// `history`: how many rows of state.history are valid, displacements of earlier steps of the same h; updated.
+  /// `history`: how many rows of state.history are valid, displacements of earlier steps; updated. Of order 2 they are brought to the length of this
+  /// one where they are of another.
   /// A step that fails leaves the state complete, as it was at its beginning.
   virtual StepReport step(State<double>& state, int& history, double time, double h, Then then) = 0;
   /// Of effects, in the step taken last.
   virtual const EffectAccount& effect_account() const = 0;
+  /// Twists of all bodies [rad/s, m/s], body frame: in the mean motion of the step taken last, of order 2; those that joint velocities make at the
+  /// positions of the last refresh or step.
+  virtual void mean_twists(const State<double>& state, Field<double, 6>& twist) = 0;
+  virtual void twists_of(const Field<double>& v, Field<double, 6>& twist) = 0;
 
   /// From now on the impulses of effects in a step are kept, as those of the step taken last; without effects there are none.
   virtual void keep_impulses() = 0;

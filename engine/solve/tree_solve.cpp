@@ -74,11 +74,18 @@ StepStatus TreeSolve<kEffects>::run(Evaluated<double> now, Factor factor, double
   return StepStatus::converged;
 }
 
-/// A displacement that would open a coupling is none.
+/// A displacement that would open a coupling is none, nor one in which rows that give way work as they cannot.
 template <bool kEffects>
-Lanes TreeSolve<kEffects>::refused(Lanes solved) {
-  if (solved == 0 || sweeps_.widest_gap() <= kMostOpen) return 0;
-  status_ = StepStatus::opens;
+Lanes TreeSolve<kEffects>::refused(Lanes solved, const Evaluated<double>& now) {
+  if (solved == 0) return 0;
+  if (sweeps_.widest_gap() > kMostOpen) {
+    status_ = StepStatus::opens;
+  } else if (sweeps_.strays(kMostStray, h_, now)) {
+    status_ = StepStatus::gains_energy;
+    report_->slot = fastest_body(model_, sweeps_.constants(), work_);
+  } else {
+    return 0;
+  }
   return 1;
 }
 

@@ -41,7 +41,7 @@ class TreeSolve {
   Lanes update_states(const StateUpdate<bool>& update);
   void first_correction(double norm, double before, bool at_floor);
   bool stale(const Evaluated<double>& now, double before) const;
-  Lanes refused(Lanes solved);
+  Lanes refused(Lanes solved, const Evaluated<double>& now);
   void put_aside(Lanes, Lanes, Lanes) {}
   Evaluated<double> cut(double share);
   Evaluated<double> take_back(double share) { return tried(sweeps_.correct(-share, *report_)); }

@@ -43,6 +43,7 @@ template <bool kEffects>
 StepReport TreeStepper<kEffects>::whole_step(State<double>& state, int& history, double time, double h, Then then) {
   StepReport report;
   time_ = time;
+  if (history > 0 && !has_stages_ && state.last_step(0) != h) change_length(state, h);
   clear_account();
   bool changes = false;  // before a solve fails: parts of the step are taken, or a start is struck at its limits
   if constexpr (kEffects) {
@@ -74,6 +75,26 @@ StepReport TreeStepper<kEffects>::whole_step(State<double>& state, int& history,
   restore(state);
   history = history_before;
   return report;
+}
+
+/// What is known of steps before, brought to the length of this one. What effects keep of their own is of the one before as it was.
+template <bool kEffects>
+void TreeStepper<kEffects>::change_length(State<double>& state, double h) {
+  const double times = h / state.last_step(0);
+  for (double& displacement : state.history.flat()) displacement *= times;
+  sweeps_.change_length(times);
+  state.last_step(0) = h;
+  is_new_length_ = true;
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::mean_twists(const State<double>& state, Field<double, 6>& twist) {
+  sweeps_.mean_twists(state.history, state.last_step(0), twist);
+}
+
+template <bool kEffects>
+void TreeStepper<kEffects>::twists_of(const Field<double>& v, Field<double, 6>& twist) {
+  sweeps_.twists_of(v, twist);
 }
 
 /// Whether nothing closes the couplings where the part of the step that was tried last, from this state, leads joints whose motion is given.
@@ -306,15 +327,17 @@ StepStatus TreeStepper<kEffects>::solve(State<double>& state, int history, doubl
 /// Whether the solution is another root than the motion's; see judge.hpp. Nothing is known of the step before the first.
 template <bool kEffects>
 bool TreeStepper<kEffects>::gains_energy(const State<double>& state, int history, double h, StepReport& report) {
-  if (solve_.least_w() > kFreeCosine || state.last_step(0) == 0) return false;
+  const NoOtherRoot& bounds = no_other_root(model_);
+  if (solve_.least_w() > bounds.cosine || state.last_step(0) == 0) return false;
   if (history > 0 && options_.guess == FirstGuess::extrapolation) {
     const Extrapolation guess = extrapolation(state.history, history);
     const auto guessed = [&](Index row) { return extrapolated(guess, state.history, row); };
-    if (may_be_another_root(model_.tree, sweeps_.constants(), 1, solve_.least_w(), work_.delta, guessed) == 0) return false;
+    if (may_be_another_root(bounds, model_.tree, sweeps_.constants(), 1, solve_.least_w(), work_.delta, guessed) == 0) return false;
   }
   if (!kEffects) know_before(state, h);
   const EnergyStep energy = sweeps_.energy_step(before_, has_stages_ ? state.last_step(0) : h, h, report);
-  return energy.now - energy.before - energy.work > kMostGain * std::max(energy.now, energy.before);
+  const double most = std::max(energy.now, energy.before);
+  return energy.now - energy.before - energy.work > kMostGain * most || std::abs(energy.rigid_work) > kMostStray * most;
 }
 
 template <bool kEffects>
@@ -355,7 +378,8 @@ template <bool kEffects>
 void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h, Then then, [[maybe_unused]] StepReport& report) {
   EffectAccount part;
   if constexpr (kEffects) {
-    part = effects_.account(sweeps_.joint_residual(), work_.delta, before_, state.last_step(0) == h);
+    part = effects_.account(sweeps_.joint_residual(), work_.delta, before_, state.last_step(0) == h && !is_new_length_);
+    is_new_length_ = false;
     if (impulses_.kept()) {
       impulses_.add(effects_, model_, h, state.q, work_.placement, work_.motion, work_.delta, sweeps_.joint_residual());
     }
@@ -399,6 +423,7 @@ void TreeStepper<kEffects>::finish(State<double>& state, int& history, double h,
 template <bool kEffects>
 void TreeStepper<kEffects>::forget() {
   solve_.held() = {};
+  is_new_length_ = false;
   sweeps_.forget_contacts();
   if constexpr (kEffects) effects_.forget();
 }

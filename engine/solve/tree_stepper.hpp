@@ -45,6 +45,8 @@ class TreeStepper final : public Stepper {
   void forget() override;
   StepReport step(State<double>& state, int& history, double time, double h, Then then) override;
   const EffectAccount& effect_account() const override { return account_; }
+  void mean_twists(const State<double>& state, Field<double, 6>& twist) override;
+  void twists_of(const Field<double>& v, Field<double, 6>& twist) override;
   void keep_impulses() override;
   const StepImpulses& impulses() const override;
   std::vector<CouplingState> couplings(double h) const override { return sweeps_.couplings(h); }
@@ -64,6 +66,7 @@ class TreeStepper final : public Stepper {
 
  private:
   StepReport whole_step(State<double>& state, int& history, double time, double h, Then then);
+  void change_length(State<double>& state, double h);
   bool cannot_follow(const State<double>& state);
   bool gains_energy(const State<double>& state, int history, double h, StepReport& report);
   void begin_effects(const State<double>& state, double h)
@@ -99,6 +102,7 @@ class TreeStepper final : public Stepper {
   [[no_unique_address]] std::conditional_t<kEffects, ImpulseAccount, NoImpulses> impulses_;  // likewise, where somebody asks
   Field<double> before_;  // see know_before
   [[no_unique_address]] std::conditional_t<kEffects, Blows, NoBlows> blows_;
+  bool is_new_length_ = false;  // see change_length
   bool passable_ = false;  // see limits.hpp
   double time_ = 0;
   State<double> last_good_;           // see keep

@@ -16,8 +16,8 @@ namespace {
 /// Contacts that are remembered, for each shape; no shape is touched at more places at once.
 constexpr std::size_t kMostOfShape = 32;
 
-/// Numbers of one.
-constexpr std::size_t kNumbers = kNumbersOfTouch, kForceAt = 3, kSpringAt = 6, kDepthAt = 7;
+/// Where numbers of one are.
+constexpr std::size_t kForceAt = 3, kSpringAt = 6, kDepthAt = 7, kMomentAt = 8;
 
 Vec3<double> vector(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
@@ -97,7 +97,8 @@ std::array<double, 9> directions_of(const Vec3<double>& n) {
 
 }  // namespace
 
-BodyContacts::BodyContacts(const PairContact& contact, const Model& model) : contact_(contact), rows_(static_cast<std::size_t>(model.tree.shape.velocities)) {
+BodyContacts::BodyContacts(const PairContact& contact, const Model& model)
+    : contact_(contact), rows_(static_cast<std::size_t>(model.tree.shape.velocities)), numbers_of_touch_(numbers_of_touch(contact)) {
   const BodyConstants<double>& bodies = model.constants;
   const auto mass = [&](std::size_t shape) {
     const Index slot = contact.shapes[shape].slot;
@@ -119,7 +120,7 @@ BodyContacts::BodyContacts(const PairContact& contact, const Model& model) : con
   }
   std::size_t most = 0;
   for (const auto& [a, b] : contact.pairs) most += contact.shapes[a].shape.heights ? kMostHeightContacts : 4;
-  memory_.assign(first_number() + kNumbers * std::min(kMostOfShape * contact.shapes.size(), most), 0.0);
+  memory_.assign(first_number() + numbers_of_touch_ * std::min(kMostOfShape * contact.shapes.size(), most), 0.0);
   forget();
 }
 
@@ -196,8 +197,10 @@ void BodyContacts::add_place(std::size_t pair, const Vec3<double>& normal, const
   const CouplingKind kind = both ? CouplingKind::round_contact : CouplingKind::face_contact;
   if (touches_.size() > couplings_.size()) couplings_.emplace_back();
   Coupling& coupling = couplings_[touches_.size() - 1];
-  changed_ = changed_ || coupling.kind != kind || coupling.slot_a != first.slot || coupling.slot_b != second.slot;
+  const double arm = contact_.material(pair).resists_turning() ? std::min(reach_[a], reach_[b]) : 0;
+  changed_ = changed_ || coupling.kind != kind || coupling.slot_a != first.slot || coupling.slot_b != second.slot || (coupling.length > 0) != (arm > 0);
   coupling.kind = kind;
+  coupling.length = arm;
   coupling.slot_a = first.slot;
   coupling.slot_b = second.slot;
   coupling.frame_a = pose_in(load<Placement, double>(pose, first.slot), R, point.place - half);
@@ -212,9 +215,9 @@ void BodyContacts::add_place(std::size_t pair, const Vec3<double>& normal, const
 
 /// They are in the order of pairs, and end where nothing is remembered.
 std::span<const double> BodyContacts::remembered_of_pair(std::size_t pair) const {
-  const auto number = [&](std::size_t k) { return memory_[first_number() + kNumbers * k]; };
+  const auto number = [&](std::size_t k) { return memory_[first_number() + numbers_of_touch_ * k]; };
   const auto search = [&](double least) {
-    std::size_t low = 0, high = (memory_.size() - first_number()) / kNumbers;
+    std::size_t low = 0, high = (memory_.size() - first_number()) / numbers_of_touch_;
     while (low < high) {
       const std::size_t middle = (low + high) / 2;
       if (number(middle) != 0 && number(middle) < least) low = middle + 1;
@@ -224,20 +227,21 @@ std::span<const double> BodyContacts::remembered_of_pair(std::size_t pair) const
   };
   const auto name = static_cast<double>(pair + 1);
   const std::size_t begin = search(name), end = search(name + 1);
-  return std::span(memory_).subspan(first_number() + kNumbers * begin, kNumbers * (end - begin));
+  return std::span(memory_).subspan(first_number() + numbers_of_touch_ * begin, numbers_of_touch_ * (end - begin));
 }
 
 std::span<const double> BodyContacts::remembered(std::size_t touch) const {
   const std::span<const double> of_pair = remembered_of_pair(touches_[touch].pair);
-  for (std::size_t at = 0; at < of_pair.size(); at += kNumbers) {
-    if (of_pair[at + 1] == half_of(touches_[touch].feature, 0) && of_pair[at + 2] == half_of(touches_[touch].feature, 1)) return of_pair.subspan(at, kNumbers);
+  for (std::size_t at = 0; at < of_pair.size(); at += numbers_of_touch_) {
+    const bool same = of_pair[at + 1] == half_of(touches_[touch].feature, 0) && of_pair[at + 2] == half_of(touches_[touch].feature, 1);
+    if (same) return of_pair.subspan(at, numbers_of_touch_);
   }
   return {};
 }
 
 double BodyContacts::stored_of_last() const {
   double sum = 0;
-  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += kNumbers) sum += 0.25 * memory_[at + kSpringAt] * memory_[at + kDepthAt];
+  for (std::size_t at = first_number(); at < memory_.size() && memory_[at] != 0; at += numbers_of_touch_) sum += 0.25 * memory_[at + kSpringAt] * memory_[at + kDepthAt];
   return sum;
 }
 
@@ -247,6 +251,10 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
   const double rigid = kRigid * lighter_[at.pair] / (h * h), stiffness = std::min(material.stiffness, rigid);
   Step& step = steps_[touch];
   step = {.law = {h * h * stiffness, material.friction, h * kContactCreep, 0}, .stiffness = stiffness, .spring_lift = 0};
+  if (const double arm = couplings_[touch].length; arm > 0) {
+    step.law.rolling = material.rolling_friction / arm;
+    step.law.torsion = material.torsional_friction / arm;
+  }
   const double fall = 2 * h * h * gravity;
   if (material.restitution > 0 && -opened > h * kLeastRebound + fall && at.gap + opened < fall) {
     step.law.stiffness = h * h * rigid;
@@ -256,7 +264,7 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
   }
   const std::span<const double> of_pair = remembered_of_pair(at.pair);
   double borne = 0;  // the deepest of it
-  for (std::size_t one = 0; one < of_pair.size(); one += kNumbers) borne = std::max(borne, of_pair[one + kDepthAt]);
+  for (std::size_t one = 0; one < of_pair.size(); one += numbers_of_touch_) borne = std::max(borne, of_pair[one + kDepthAt]);
   const double gap = std::min(0.0, at.gap);
   step.found = std::max(0.0, -gap - borne);
   step.spring_lift = std::max(0.0, step.found - h * kRecoverySpeed);
@@ -266,30 +274,39 @@ ContactLaw BodyContacts::begin(std::size_t touch, double h, double opened, doubl
   return step.law;
 }
 
-std::array<double, 3> BodyContacts::guess_of(std::size_t touch, double h) const {
+BodyContacts::Force BodyContacts::guess_of(std::size_t touch, double h) const {
   const std::span<const double> last = remembered(touch);
-  std::array<double, 3> guess{};
-  for (std::size_t j = 0; !last.empty() && j < 3; ++j) guess[j] = h * h * dot(vector(&touches_[touch].across[3 * j]), vector(&last[kForceAt]));
+  Force guess{};
+  if (last.empty()) return guess;
+  const double arm = couplings_[touch].length;
+  for (std::size_t j = 0; j < 3; ++j) {
+    const Vec3<double> way = vector(&touches_[touch].across[3 * j]);
+    guess[j] = h * h * dot(way, vector(&last[kForceAt]));
+    if (arm > 0) guess[3 + j] = h * h / arm * dot(way, vector(&last[kMomentAt]));
+  }
   return guess;
 }
 
-Vec3<double> BodyContacts::force_on_b(std::size_t touch) const {
+Vec3<double> BodyContacts::push_on_b(std::size_t touch, const Force& along) const {
   const std::array<double, 9>& d = touches_[touch].across;
-  const Force& force = forces_[touch];
-  return force[0] * vector(&d[0]) + force[1] * vector(&d[3]) + force[2] * vector(&d[6]);
+  return along[0] * vector(&d[0]) + along[1] * vector(&d[3]) + along[2] * vector(&d[6]);
+}
+
+Vec3<double> BodyContacts::moment_on_b(std::size_t touch, const Force& along) const {
+  const std::array<double, 9>& d = touches_[touch].across;
+  return couplings_[touch].length * (along[3] * vector(&d[0]) + along[4] * vector(&d[3]) + along[5] * vector(&d[6]));
 }
 
 void BodyContacts::push_lasting(double h, const Field<double, 12>& pose, Field<double, 6>& impulse) const {
   for (std::size_t k = 0; k < touches_.size(); ++k) {
-    const std::array<double, 9>& d = touches_[k].across;
-    const Force& last = lasting_[k];
-    const Vec3<double> on_b = (0.5 / h) * (last[0] * vector(&d[0]) + last[1] * vector(&d[3]) + last[2] * vector(&d[6]));
+    const Vec3<double> on_b = (0.5 / h) * push_on_b(k, lasting_[k]), turns_b = (0.5 / h) * moment_on_b(k, lasting_[k]);
     const Vec3<double> place = vector(touches_[k].place.data());
-    for (const auto& [slot, force] : {std::pair(couplings_[k].slot_a, -1.0 * on_b), std::pair(couplings_[k].slot_b, on_b)}) {
+    for (const auto& [slot, sign] : {std::pair(couplings_[k].slot_a, -1.0), std::pair(couplings_[k].slot_b, 1.0)}) {
       if (slot == 0) continue;
       const auto body = load<Placement, double>(pose, slot);
-      const Vec3<double> own = transpose_times(body.R, force), arm = transpose_times(body.R, place - body.p);
-      store(impulse, slot, load<Wrench, double>(impulse, slot) + Wrench<double>{cross(arm, own), own});
+      const Vec3<double> own = transpose_times(body.R, sign * on_b), arm = transpose_times(body.R, place - body.p);
+      const Vec3<double> moment = cross(arm, own) + transpose_times(body.R, sign * turns_b);
+      store(impulse, slot, load<Wrench, double>(impulse, slot) + Wrench<double>{moment, own});
     }
   }
 }
@@ -301,7 +318,8 @@ std::vector<TouchImpulse> BodyContacts::impulses(double h) const {
     const Touch& touch = touches_[k];
     TouchImpulse& one = pushing.emplace_back(TouchImpulse{touch.pair, touch.feature, couplings_[k].slot_a, couplings_[k].slot_b, touch.place});
     std::copy_n(touch.across.begin() + 6, 3, one.normal.begin());
-    (h * force_on_b(k)).to(one.impulse.data());
+    (h * push_on_b(k, forces_[k])).to(one.impulse.data());
+    (h * moment_on_b(k, forces_[k])).to(one.moment.data());
   }
   return pushing;
 }
@@ -310,16 +328,28 @@ void BodyContacts::remember() {
   for (std::size_t k = 0; k < poses_.size(); ++k) {
     std::ranges::copy(poses_[k].shift, memory_.begin() + static_cast<std::ptrdiff_t>(kRememberedMiddle + 3 * k));
   }
+  const auto loads = std::span(memory_).subspan(remembered_load(poses_.size()), 2 * poses_.size());
+  std::ranges::fill(loads, 0.0);
+  for (std::size_t k = 0; k < touches_.size(); ++k) {
+    if (forces_[k][2] == 0) continue;
+    const auto& [a, b] = contact_.pairs[touches_[k].pair];
+    for (const std::size_t shape : {a, b}) {
+      loads[2 * shape] += 1;
+      loads[2 * shape + 1] += forces_[k][2];
+    }
+  }
   std::size_t at = first_number();
   for (std::size_t k = 0; k < touches_.size() && at < memory_.size(); ++k) {
     if (forces_[k][2] == 0 || steps_[k].stiffness == 0) continue;
-    const Vec3<double> force = force_on_b(k);
+    const Vec3<double> force = push_on_b(k, forces_[k]), moment = moment_on_b(k, forces_[k]);
     const std::array numbers{static_cast<double>(touches_[k].pair + 1), half_of(touches_[k].feature, 0), half_of(touches_[k].feature, 1),
-                             force.x, force.y, force.z, steps_[k].spring(), steps_[k].depth};
-    std::ranges::copy(numbers, memory_.begin() + static_cast<std::ptrdiff_t>(at));
-    at += kNumbers;
+                             force.x, force.y, force.z, steps_[k].spring(), steps_[k].depth, moment.x, moment.y, moment.z};
+    std::copy_n(numbers.begin(), numbers_of_touch_, memory_.begin() + static_cast<std::ptrdiff_t>(at));
+    at += numbers_of_touch_;
   }
-  for (; at < memory_.size() && memory_[at] != 0; at += kNumbers) std::fill_n(memory_.begin() + static_cast<std::ptrdiff_t>(at), kNumbers, 0.0);
+  for (; at < memory_.size() && memory_[at] != 0; at += numbers_of_touch_) {
+    std::fill_n(memory_.begin() + static_cast<std::ptrdiff_t>(at), numbers_of_touch_, 0.0);
+  }
 }
 
 }  // namespace linden

@@ -4,7 +4,8 @@
 //   law_of   of a step, with what the contact bore in the last one
 //   keep     at its end: forces, what they took, what is stored
 //
-// Each is three rows of couplings (layout/couplings.hpp), for one step. Which pairs are near goes by their gap beside their size and by how far
+// Each is three rows of couplings (layout/couplings.hpp), or six where its material resists turning, for one step. The arm of turns is how far the
+// smaller shape reaches: what creeps by turning about its middle creeps as far as what slides. Which pairs are near goes by their gap beside their size and by how far
 // they moved in the last step: what may meet in this one is among them.
 //
 // What is stored is k (d^2 + d'^2) / 4 of the depths d and d' at the ends of a step, N = k d' of that step: then work along the mean displacement of two
@@ -58,10 +59,13 @@ S gap_looked_at(double reach_a, double reach_b, const S& moved_a, const S& moved
 }
 
 /// What is remembered from step to step: energy stored [J]; whether something lasted; where the middle of each shape was at the beginning of the last
-/// step, in three numbers [m]; what lasted, along each of `rows` velocities; and what each touch bore, in so many: its pair, from 1; both halves of its
-/// feature; the force on b in the world's frame, and of the spring alone [N]; how deep that is pressed [m]. A zero ends it.
-inline constexpr std::size_t kLasted = 1, kRememberedMiddle = 2, kNumbersOfTouch = 8;
-inline std::size_t remembered_touch(std::size_t shapes, std::size_t rows) { return kRememberedMiddle + 3 * shapes + rows; }
+/// step, in three numbers [m]; at how many places each was pushed in it, and the force along the normal of all of them [N]; what lasted, along each of `rows` velocities; and what each touch bore, in so many: its pair, from 1; both halves of its
+/// feature; the force on b in the world's frame, and of the spring alone [N]; how deep that is pressed [m]; where some material resists turning the
+/// moment on b that does, in the world's frame [N m]. A zero ends it.
+inline constexpr std::size_t kLasted = 1, kRememberedMiddle = 2;
+inline std::size_t numbers_of_touch(const PairContact& contact) { return contact.resists_turning() ? 11 : 8; }
+inline constexpr std::size_t remembered_load(std::size_t shapes) { return kRememberedMiddle + 3 * shapes; }
+inline constexpr std::size_t remembered_touch(std::size_t shapes, std::size_t rows) { return remembered_load(shapes) + 2 * shapes + rows; }
 
 /// Of the largest of a step, a load that is none: what rounding leaves where places let go of each other.
 inline constexpr double kNoLoad = 1e-14;
@@ -76,8 +80,8 @@ class BodyContacts {
     std::array<double, 3> place;   // between them, world frame [m]
     std::array<double, 9> across;  // world frame, rows: two directions across the normal, and the normal, from a to b
   };
-  /// What it bore in the last step, along `across` [N]: two across, one along the normal.
-  using Force = std::array<double, 3>;
+  /// What it bore in the last step, along `across`: two across, one along the normal [N]; the moment that resists turning, over its arm, likewise [N].
+  using Force = std::array<double, kMostContactRows>;
 
   /// Of this model. The contact must outlive this.
   BodyContacts(const PairContact& contact, const Model& model);
@@ -90,7 +94,7 @@ class BodyContacts {
 
   /// What a step of h begins with. opened: by how much its gap changed in the last one, had that been as long [m]; gravity [m/s^2].
   ContactLaw begin(std::size_t touch, double h, double opened, double gravity);
-  std::array<double, 3> guess_of(std::size_t touch, double h) const;
+  std::array<double, kMostContactRows> guess_of(std::size_t touch, double h) const;
   /// Of the step solved last, of h, before bodies are placed at its end; before, now: displacements of the step before and of this one.
   /// book(slot of b, energy, freed) of what each took, and of what it may give to push out the depth that was found [J].
   template <class Book>
@@ -103,18 +107,18 @@ class BodyContacts {
     double largest = 0;
     for (std::size_t k = 0; k < touches_.size(); ++k) largest = std::max(largest, solved.impulse_of(k)[2]);
     for (std::size_t k = 0; k < touches_.size(); ++k) {
-      std::array<double, 3> impulse = solved.impulse_of(k);
-      if (impulse[2] <= kNoLoad * largest) impulse = {0, 0, 0};
-      const std::array<double, 3> opens = solved.opens(k, before, now);
+      Force impulse = solved.impulse_of(k);
+      if (impulse[2] <= kNoLoad * largest) impulse = {};
+      const Force opens = solved.opens(k, before, now);
       double given = 0;
-      for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t j = 0; j < kMostContactRows; ++j) {
         forces_[k][j] = impulse[j] / (h * h);
         given += forces_[k][j] * opens[j];
       }
       steps_[k].depth = steps_[k].depth_of(impulse[2]);
       memory_[0] += 0.25 * steps_[k].spring() * steps_[k].depth;
-      const std::array<double, 3> last = guess_of(k, h);
-      for (std::size_t j = 0; j < 3; ++j) {
+      const Force last = guess_of(k, h);
+      for (std::size_t j = 0; j < kMostContactRows; ++j) {
         lasting_[k][j] = persistent(impulse[j], last[j]);
         memory_[kLasted] = lasting_[k][j] != 0 ? 1 : memory_[kLasted];
       }
@@ -164,7 +168,9 @@ class BodyContacts {
   void remember();
   /// Those of what is remembered of the last step.
   double stored_of_last() const;
-  Vec3<double> force_on_b(std::size_t touch) const;
+  /// On b, in the world's frame, of numbers along `across`: of what pushes, and of what resists turning [N, N m].
+  Vec3<double> push_on_b(std::size_t touch, const Force& along) const;
+  Vec3<double> moment_on_b(std::size_t touch, const Force& along) const;
   /// What is remembered of a pair's contacts, one after the other; of one of them, or nothing.
   std::span<const double> remembered_of_pair(std::size_t pair) const;
   std::span<const double> remembered(std::size_t touch) const;
@@ -177,6 +183,7 @@ class BodyContacts {
 
   const PairContact& contact_;
   std::size_t rows_;             // of velocities
+  std::size_t numbers_of_touch_; // see remembered_touch
   std::vector<double> lighter_;  // of each pair, of both bodies [kg]
   std::vector<Touch> touches_;
   std::vector<Step> steps_;      // of each

@@ -48,7 +48,7 @@ class CouplingRows {
       for (std::size_t row = 0; row < path.rows(); ++row) {
         const GapKind kind = rows_of(*path.coupling)[row].kind;
         const bool shifts = kind == GapKind::shift || kind == GapKind::halfway || kind == GapKind::length;
-        size_[path.first_row + row] = as<S>(shifts ? path.length : 1.0);
+        size_[path.first_row + row] = as<S>(shifts ? path.length : kind == GapKind::turn ? path.coupling->length : 1.0);
         if (kind == GapKind::angle) angles_.push_back({path.first_row + row, S(0.0)});
       }
     }
@@ -102,6 +102,12 @@ class CouplingRows {
         }
         if (row == 2) gap = gap - as<S>(coupling.rounding[0] + coupling.rounding[1]);
       }
+      if (path.rows() > 3) {
+        const Vec3<S> turned = b.half_turn_against(a);
+        for (int axis = 0; axis < 3; ++axis) {
+          gap_[path.first_row + 3 + static_cast<std::size_t>(axis)] = as<S>(2 * coupling.length) * dot(turned, axis_of(A.R, axis));
+        }
+      }
       if (coupling.oval != decltype(coupling.oval){}) {
         // axes of both frames at the end, and how far that of b is then tilted against the normal of a
         const Vec3<S> n = axis_of(A.R, 2), tilted = a.turned(n);
@@ -151,9 +157,10 @@ class CouplingRows {
     return widest;
   }
 
-  /// G v of a row.
-  S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const {
-    const S* const g = &begin_[path.first_velocity + (row - path.first_row)];
+  /// G v of a row; numbers: those of G, or J.
+  S opening_of(const CouplingPath& path, std::size_t row, const Field<S>& v) const { return opening_of(path, row, begin_, v); }
+  S opening_of(const CouplingPath& path, std::size_t row, const std::vector<S>& numbers, const Field<S>& v) const {
+    const S* const g = &numbers[path.first_velocity + (row - path.first_row)];
     S sum(0.0);
     each_on_path(path, [&](Index at_v, std::size_t n) { sum = sum + g[n * path.room] * v(at_v); });
     return sum;
@@ -196,6 +203,12 @@ class CouplingRows {
     }
     /// By how much a direction changes.
     Vec3<S> turned(const Vec3<S>& n) const { return body.R * turned_within(transpose_times(body.R, n)); }
+    /// sin(theta/2) l of the turn against another body, seen from that one, which moves with it; in the world at the beginning.
+    Vec3<S> half_turn_against(const Moved& other) const {
+      const Vec3<S> mine = body.R * by.r.v, its = other.body.R * other.by.r.v;
+      const Vec3<S> turn = other.by.r.w * mine - by.r.w * its - cross(its, mine);
+      return select(other.by.r.w * by.r.w + dot(its, mine) < S(0.0), S(-1.0), S(1.0)) * turn;
+    }
     Along along(const Vec3<S>& x) const { return {x, body.R * (by.p + turned_within(transpose_times(body.R, x - body.p)))}; }
 
    private:

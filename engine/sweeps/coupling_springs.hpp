@@ -49,6 +49,11 @@ class CouplingSprings {
       left = left - (as<S>(spring.law.yield) * lambda[spring.row] + as<S>(spring.law.drift) * spring.begin);
     }
   }
+  /// How much farther a row works in a step than its gap changes, if at q^k and at q^k+1 it opens by these: nothing, where the step follows how it turns.
+  S strays(std::size_t row, const S& gap, const S& opens_at_begin, const S& opens_at_end) const {
+    const Spring& spring = spring_of(row);
+    return opens_at_end + as<S>(spring.law.share) * (opens_at_begin - opens_at_end) - (gap - spring.begin);
+  }
   /// Whole multiplier of a row, from the share of it that acts at the beginning.
   S whole(std::size_t row, const S& multiplier) const { return multiplier / as<S>(spring_of(row).law.share); }
 

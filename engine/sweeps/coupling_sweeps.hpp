@@ -56,6 +56,9 @@ namespace linden {
 /// How long the factor of a step is to serve: till another is made, of whatever, or for steps that follow, so that others have one of their own.
 enum class Serves : std::uint8_t { till_the_next, steps_that_follow };
 
+/// Rows that a contact can have.
+inline constexpr std::size_t kMostContactRows = 6;
+
 /// Pack: what rows of a coupling are side by side in (row_lanes.hpp).
 template <class S, class Pack = RowPack<S>>
 class CouplingSweeps {
@@ -128,6 +131,10 @@ class CouplingSweeps {
       const auto at = static_cast<std::size_t>(row);
       history_(row, 0) = lambda_[at] + increment_[at];
     }
+  }
+  /// Steps are so many times as long from now on; multipliers are impulses times h.
+  void change_length(double times) {
+    for (S& multiplier : history_.flat()) multiplier = as<S>(times * times) * multiplier;
   }
   /// Gaps at the end of motions of the joints; rows: and how joints change them there, before a factor is made.
   void find_gaps(const Field<S, 12>& placement, const Field<S, 7>& motion, const Field<S>& delta, Asked asked) {
@@ -258,23 +265,27 @@ class CouplingSweeps {
 
   std::size_t contacts() const { return laws_.size(); }
   /// After begin: the law of a contact in this step, and the impulse along its rows that is to be expected.
-  void set_contact(std::size_t contact, const ContactLaw& law, const std::array<double, 3>& guess) {
+  void set_contact(std::size_t contact, const ContactLaw& law, const std::array<double, kMostContactRows>& guess) {
     laws_[contact] = law;
-    for (std::size_t j = 0; j < 3; ++j) guess_[first_of(contact) + j] = as<S>(guess[j]);
+    const CouplingPath& path = path_of(contact);
+    for (std::size_t j = 0; j < path.rows(); ++j) guess_[path.first_row + j] = as<S>(guess[j]);
   }
   /// By how much a displacement changes the gap of a contact, from where bodies are at the beginning.
-  S opened(std::size_t contact, const Field<S>& displacement) const { return opening(first_of(contact) + 2, displacement); }
+  S opened(std::size_t contact, const Field<S>& displacement) const { return opening(path_of(contact).first_row + 2, displacement); }
   /// Of the step solved last: the impulse along each of its rows, times h; how far each opens at its beginning in the mean of it and of the step
-  /// before, of these displacements: what an impulse between the two works along. Before bodies are placed at its end.
-  std::array<S, 3> impulse_of(std::size_t contact) const {
-    const std::size_t row = first_of(contact);
-    return {lambda_[row] + increment_[row], lambda_[row + 1] + increment_[row + 1], lambda_[row + 2] + increment_[row + 2]};
+  /// before, of these displacements: what an impulse between the two works along. Before bodies are placed at its end. Zero of rows that it has not.
+  std::array<S, kMostContactRows> impulse_of(std::size_t contact) const {
+    const CouplingPath& path = path_of(contact);
+    std::array<S, kMostContactRows> impulse{};
+    for (std::size_t j = 0; j < path.rows(); ++j) impulse[j] = lambda_[path.first_row + j] + increment_[path.first_row + j];
+    return impulse;
   }
-  std::array<S, 3> opens(std::size_t contact, const Field<S>& before, const Field<S>& now) const {
-    std::array<S, 3> mean;
-    for (std::size_t j = 0; j < 3; ++j) {
-      const std::size_t row = first_of(contact) + j;
-      mean[j] = S(0.5) * (opening(row, before) + opening(row, now));
+  std::array<S, kMostContactRows> opens(std::size_t contact, const Field<S>& before, const Field<S>& now) const {
+    const CouplingPath& path = path_of(contact);
+    std::array<S, kMostContactRows> mean{};
+    for (std::size_t j = 0; j < path.rows(); ++j) {
+      const std::size_t row = path.first_row + j;
+      mean[j] = S(0.5) * (rows_.opening_of(path, row, before) + rows_.opening_of(path, row, now));
     }
     return mean;
   }
@@ -322,6 +333,22 @@ class CouplingSweeps {
     springs_.excess(h, opening, pull_);
     rows_.push(pull_, rows_.at_begin(), p, minus);
   }
+  /// Whether rows that give way work otherwise in the step solved last, of h and of this displacement, than their gaps change, by more than this share
+  /// of the energies that move them, h^2 x kinetic and their own.
+  auto strays(double share, double h, const S& kinetic, const Field<S>& delta) const {
+    using std::abs, std::max;
+    constexpr double kRounding = 1e3 * static_cast<double>(std::numeric_limits<typename ElementOf<S>::type>::epsilon());  // of a gap, beside its size
+    S sum(0.0);
+    for (const CouplingPath& path : all()) {
+      for (std::size_t row = path.first_row; row < path.last_row; ++row) {
+        if (is_rigid(row)) continue;
+        const S begin = rows_.opening_of(path, row, rows_.at_begin(), delta), end = rows_.opening_of(path, row, rows_.at_end(), delta);
+        const S farther = abs(springs_.strays(row, gap(row), begin, end)) - as<S>(kRounding) * size(row);
+        sum = sum + abs(multiplier(row)) * max(farther, S(0.0));
+      }
+    }
+    return sum > as<S>(share) * (kinetic + as<S>(h * h) * potential());
+  }
   /// Of rows that give way, at q^k [J].
   S potential() const { return springs_.potential(); }
 
@@ -361,6 +388,14 @@ class CouplingSweeps {
     const S at_begin = lambda_[row] + increment_[row];
     return is_rigid(row) ? at_begin : springs_.whole(row, at_begin);
   }
+  /// What multipliers of rigid rows of couplings, times h^2, work along a way of the joints from q^k.
+  S rigid_work(const Field<S>& way) const {
+    S sum(0.0);
+    for (std::size_t row = 0; row < rows_.paths().lasting_rows(); ++row) {
+      if (is_rigid(row)) sum = sum + multiplier(row) * opening(row, way);
+    }
+    return sum;
+  }
   /// Whether a row is held by others already: its gap is watched, nothing pushes along it.
   auto is_held_already(std::size_t row) const { return is_rigid(row) && made_last_->inverse(row) == S(0.0); }
   /// How far a unit of impulse along a row opens it, with the factor made last, loops beyond closed and others open.
@@ -383,7 +418,7 @@ class CouplingSweeps {
   static constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
   bool touches(std::size_t row) const { return row >= rows_.paths().lasting_rows(); }
-  std::size_t first_of(std::size_t contact) const { return rows_.paths().lasting_rows() + 3 * contact; }
+  const CouplingPath& path_of(std::size_t contact) const { return all()[model_.couplings.size() + contact]; }
   void prepare_contacts() {
     for (std::size_t closure = 0; !laws_.empty() && closure < closures().size(); ++closure) {
       if (closures()[closure].touches()) contact_solves_.prepare(closure, of_step_.product_of(closure));
@@ -403,9 +438,11 @@ class CouplingSweeps {
         continue;
       }
       changes_[k] = guess_[row] - lambda_[row];
-      if ((row - rows_.paths().lasting_rows()) % 3 != 0) continue;
-      firsts_.push_back(k);
-      laws_there_.push_back(laws_[(row - rows_.paths().lasting_rows()) / 3]);
+    }
+    for (const std::size_t k : closures()[closure].paths) {
+      if (k < model_.couplings.size()) continue;
+      firsts_.push_back(all()[k].first_in_closure);
+      laws_there_.push_back(laws_[k - model_.couplings.size()]);
     }
     contact_solves_[closure].solve({yields_, firsts_, laws_there_, multipliers_, changes_}, right_side);
     for (std::size_t k = 0; k < rows.size(); ++k) guess_[rows[k]] = lambda_[rows[k]] + right_side[k];

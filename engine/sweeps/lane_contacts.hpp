@@ -35,6 +35,7 @@ class LaneContacts {
   /// The plan must outlive it.
   LaneContacts(const Tree& tree, const EffectPlan& plan) : tree_(tree), contact_(plan.pairs ? &*plan.effects.contact : nullptr) {
     if (contact_ == nullptr) return;
+    numbers_of_touch_ = numbers_of_touch(*contact_);
     for (const ConvexBody& body : contact_->shapes) {
       const ConvexShape& shape = body.shape;
       Shape& one = shapes_.emplace_back();
@@ -80,10 +81,12 @@ class LaneContacts {
         for (std::size_t l = 0; l < W; ++l) row[l] = (done >> l & 1u) != 0 ? static_cast<double>(each[l]) : row[l];
       }
     }
-    for (const std::size_t none : {std::size_t{0}, kLasted, first_touch()}) {
-      double* const row = block.contacts + none * W;
+    const auto clear = [&](std::size_t number) {
+      double* const row = block.contacts + number * W;
       for (std::size_t l = 0; l < W; ++l) row[l] = (done >> l & 1u) != 0 ? 0 : row[l];
-    }
+    };
+    for (const std::size_t none : {std::size_t{0}, kLasted, first_touch()}) clear(none);
+    for (std::size_t k = 0; k < 2 * shapes_.size(); ++k) clear(remembered_load(shapes_.size()) + k);
   }
 
   /// What lane l remembers, into the memory of one that remembers nothing, for it to be stepped alone; and of the step that it took so.
@@ -207,8 +210,8 @@ class LaneContacts {
     std::size_t k = 0;
     while (k < std::min(alone.size(), first_touch())) copy(k++);
     while (k < alone.size() && copy(k) != 0) {
-      for (std::size_t j = 1; j < kNumbersOfTouch; ++j) copy(k + j);
-      k += kNumbersOfTouch;
+      for (std::size_t j = 1; j < numbers_of_touch_; ++j) copy(k + j);
+      k += numbers_of_touch_;
     }
   }
 
@@ -218,6 +221,7 @@ class LaneContacts {
 
   const Tree& tree_;
   const PairContact* contact_;  // null: bodies do not touch each other
+  std::size_t numbers_of_touch_ = 0;
   std::vector<Shape> shapes_;
   Field<Pack, 12> pose_;        // of bodies in the world
 };

@@ -222,11 +222,15 @@ class LaneSweeps {
     }
     return 0;
   }
-  Lanes refused(Lanes lanes) const {
+  Lanes refused(Lanes lanes, const Evaluated<Pack>& now) {
     if (lanes == 0) return 0;
     Lanes found = 0;
     if constexpr (kEffects) found = effects_.blows(q_, work_.delta);
     if (coupled()) found |= ~L::bits(couplings_.widest_gap() <= number(kMostOpen));
+    if (couplings_.gives_way()) {
+      displacement_map(tree_, work_.motion, work_.delta);
+      found |= L::bits(couplings_.strays(kMostStray, step_, now.energy, work_.delta));
+    }
     return lanes & found;
   }
   void put_aside([[maybe_unused]] Lanes done, [[maybe_unused]] Lanes before, [[maybe_unused]] Lanes active) {

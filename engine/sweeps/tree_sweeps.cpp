@@ -304,6 +304,7 @@ EnergyStep TreeSweeps<kEffects>::energy_step(const Field<double>& before, double
   const auto along_mean = [&](double momentum, Index row) { return 0.5 * momentum * (solution(row) / h + before(row) / h_before); };
   step.now = momenta_of_delta(work_.momentum) / (h * h);
   for (Index row = 0; row < before.rows(); ++row) step.work += along_mean(work_.momentum(row) / h, row);
+  if (!couplings_->empty()) step.rigid_work = 0.5 / h * (couplings_->rigid_work(solution) / h + couplings_->rigid_work(before) / h_before);
   // the step before, seen from its end: the same step taken back, whose momenta point the other way
   for (Index row = 0; row < before.rows(); ++row) work_.delta(row) = -before(row);
   step.before = momenta_of_delta(work_.momentum) / (h_before * h_before);
@@ -312,6 +313,25 @@ EnergyStep TreeSweeps<kEffects>::energy_step(const Field<double>& before, double
   std::ranges::copy(solution.flat(), work_.delta.flat().begin());
   evaluate(Factor::kept, report);
   return step;
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::mean_twists(const Field<double, kHistory>& delta, double h, Field<double, 6>& twist) {
+  place_all();
+  for (Index row = 0; row < delta.rows(); ++row) work_.delta(row) = -delta(row, 0);
+  motion_map(model_.tree, *constants_, work_.delta, work_.motion);
+  displacement_down(model_.tree, work_.placement, work_.motion, work_.displacement);
+  const double rate = -1 / h;
+  for (Index i = 0; i < model_.tree.shape.slots; ++i) {
+    const Twist<double> u = log(load<Displacement, double>(work_.displacement, i));
+    store(twist, i, Twist<double>{rate * u.w, rate * u.v});
+  }
+}
+
+template <bool kEffects>
+void TreeSweeps<kEffects>::twists_of(const Field<double>& v, Field<double, 6>& twist) {
+  place_all();
+  velocity_down(model_.tree, *constants_, work_.placement, v, twist);
 }
 
 template class TreeSweeps<LINDEN_ACTING>;

@@ -46,6 +46,7 @@ namespace linden {
 /// Kinetic energies of the mean motions of two neighbouring steps, and the work of the impulses between them [J].
 struct EnergyStep {
   double before = 0, now = 0, work = 0;
+  double rigid_work = 0;  // of it, that of rigid couplings: nothing, where steps follow how they turn
 };
 
 /// kEffects: with those of the plan, beside gravity.
@@ -67,6 +68,12 @@ class TreeSweeps {
   /// After an evaluation or a refresh: of the row that is farthest open, its gap beside the size of its mechanism, the number of its coupling.
   double widest_gap() const { return couplings_->widest_gap(); }
   Index widest_coupling() const;
+  /// Whether couplings that give way work otherwise in the step solved last than their gaps change, by this share of the energies that move them.
+  bool strays(double share, double h, const Evaluated<double>& now) {
+    if (!couplings_->gives_way()) return false;
+    displacement_map(model_.tree, work_.motion, work_.delta);
+    return couplings_->strays(share, h, now.energy, work_.delta);
+  }
   /// Whether all gaps are within this share of the size of their mechanism, but for rows that others hold already.
   bool is_closed(double share) const { return couplings_->empty() || couplings_->widest_pushed_gap() <= share; }
   /// Coordinates of cables brought to their lengths at the positions of the last refresh, and a refresh; not those whose motion is given.
@@ -141,6 +148,13 @@ class TreeSweeps {
   /// two acts an impulse, whatever it is made of: the momentum at the beginning of the one less that at the end of the other, which are
   /// made anew from their displacements. It works along the mean of both velocities, to second order.
   EnergyStep energy_step(const Field<double>& before, double h_before, double h, StepReport& report);
+
+  /// Once a step is over: twists of the mean motion of one of h, `delta` its displacement, as the step taken back has them, whose twists point the
+  /// other way. A mean twist is the same seen from either end. Those that joint velocities make where bodies are.
+  void mean_twists(const Field<double, kHistory>& delta, double h, Field<double, 6>& twist);
+  void twists_of(const Field<double>& v, Field<double, 6>& twist);
+  /// Steps are so many times as long from now on.
+  void change_length(double times) { couplings_->change_length(times); }
 
   /// Whether the factor outlasts a step: reading velocities then has one of its own.
   bool reuses_factor() const { return strategy_.reuses_factor; }

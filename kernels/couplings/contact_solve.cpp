@@ -38,6 +38,9 @@ constexpr double kSteepSlope = 0.1, kGentle = 1e-3;
 /// A factor serves as long as H has changed by less than this share.
 constexpr double kSameFalls = 1e-3;
 
+/// Rows of a contact that resists turning; of others there are three.
+constexpr std::size_t kTurning = 6;
+
 /// action(width), which is known to the compiler where it is that of one free body or two.
 template <class Action>
 void with_width(std::size_t width, const Action& action) {
@@ -67,7 +70,23 @@ void ContactSolve::find_pushes(const Rows& rows, const Eigen::VectorXd& gaps, Lo
     const double d1 = slides ? s1 / length : 0, d2 = slides ? s2 / length : 0;
     const double less = load == Load::own ? -law.friction * fall * per_length : 0;
     falls_[c] = {drag * (1 - d1 * d1), -drag * d1 * d2, drag * (1 - d2 * d2), fall, less * s1, less * s2};
+    if (rows_of_[c] != kTurning) continue;
+    const bool own = load == Load::own;
+    find_turn_pushes(law, own ? push : loads_[c], own ? fall : 0, &gaps[at + 3], &pushes_[at + 3], turn_falls_[c]);
   }
+}
+
+/// The same of turns, of a load that falls so by an opening.
+void ContactSolve::find_turn_pushes(const ContactLaw& law, double borne, double fall, const double* turns, double* pushes, TurnFalls& falls) {
+  const double r1 = turns[0], r2 = turns[1], w = turns[2], length = std::sqrt(r1 * r1 + r2 * r2), spun = std::abs(w);
+  const double per_length = borne > 0 ? 1 / std::max(length, law.creep) : 0, drag = law.rolling * borne * per_length;
+  const double per_spun = borne > 0 ? 1 / std::max(spun, law.creep) : 0, twist = law.torsion * borne * per_spun;
+  pushes[0] = -drag * r1;
+  pushes[1] = -drag * r2;
+  pushes[2] = -twist * w;
+  const bool rolls = length > law.creep, spins = spun > law.creep;
+  const double d1 = rolls ? r1 / length : 0, d2 = rolls ? r2 / length : 0, less = -law.rolling * fall * per_length;
+  falls = {drag * (1 - d1 * d1), -drag * d1 * d2, drag * (1 - d2 * d2), spins ? 0 : twist, less * r1, less * r2, -law.torsion * fall * per_spun * w};
 }
 
 void ContactSolve::prepare(Product product) {
@@ -75,6 +94,7 @@ void ContactSolve::prepare(Product product) {
   std::vector<Group> groups = product_.groups;
   FrontalSolve::Elements elements;
   contact_of_.clear();
+  rows_of_.clear();
   row_group_.clear();
   widths_.clear();
   std::size_t contacts = 0, rows = 0, numbers = 0, unknowns = 0, widest = 0;
@@ -93,6 +113,7 @@ void ContactSolve::prepare(Product product) {
     row_group_.push_back(groups.size());
     if (block.touches) {
       ++contacts;
+      rows_of_.push_back(block.rows);
     } else {
       any_linear_ = true;
       elements.groups.push_back(groups.size());
@@ -115,6 +136,7 @@ void ContactSolve::prepare(Product product) {
   motion_.resize(frontal_.unknowns());
   for (Eigen::VectorXd* each : {&b_, &z_, &change_, &gaps_, &moved_, &tried_, &left_, &pushes_}) each->setZero(static_cast<Eigen::Index>(rows));
   for (std::vector<Falls>* each : {&falls_, &factored_}) each->resize(contacts);
+  for (std::vector<TurnFalls>* each : {&turn_falls_, &factored_turns_}) each->assign(contacts, TurnFalls{});
   loads_.resize(contacts);
   changes_.resize(contacts);
   for (std::vector<double>* each : {&across_, &columns_}) each->resize(numbers);
@@ -191,7 +213,7 @@ void ContactSolve::multiply(const Eigen::VectorXd& impulses, Eigen::VectorXd& op
   for (std::size_t k = 0; k < product_.blocks.size(); ++k) open(k, motion_.data(), &openings[first(k)]);
 }
 
-bool ContactSolve::is_near(const Falls& factored, const Falls& now) const {
+bool ContactSolve::is_near(const Falls& factored, const Falls& now) {
   const double most = std::max({factored[0], factored[2], now[0], now[2]});
   if (std::abs(factored[3] - now[3]) > kSameFalls * std::min(factored[3], now[3])) return false;
   for (const std::size_t k : {0u, 1u, 2u}) {
@@ -203,10 +225,28 @@ bool ContactSolve::is_near(const Falls& factored, const Falls& now) const {
   return true;
 }
 
+/// The same of turns; along: H along the normal.
+bool ContactSolve::are_near(const TurnFalls& factored, const TurnFalls& now, double along) {
+  const double most = std::max({factored[0], factored[2], factored[3], now[0], now[2], now[3]});
+  for (std::size_t k = 0; k < now.size(); ++k) {
+    if (std::abs(factored[k] - now[k]) > kSameFalls * (k < 4 ? most : along)) return false;
+  }
+  return true;
+}
+
+/// Whether anything of a contact does, as the factor has it.
+bool ContactSolve::falls_at_all(std::size_t contact) const {
+  const Falls& falls = factored_[contact];
+  if (falls[0] != 0 || falls[2] != 0 || falls[3] != 0) return true;
+  return rows_of_[contact] == kTurning && std::ranges::any_of(factored_turns_[contact], [](double number) { return number != 0; });
+}
+
 /// X H Y.
-void ContactSolve::add_contact(std::size_t block, const Falls& falls, double* front, std::size_t stride, const std::size_t* at) {
-  if (falls[0] == 0 && falls[2] == 0 && falls[3] == 0) return;
+void ContactSolve::add_contact(std::size_t block, double* front, std::size_t stride, const std::size_t* at) {
+  if (!falls_at_all(contact_of_[block])) return;
+  const Falls& falls = factored_[contact_of_[block]];
   find_places(product_.blocks[block], at);
+  if (product_.blocks[block].rows == kTurning) add_turns(block, front, stride);
   with_width(widths_[block].numbers, [&](auto width) {
     const auto& [h11, h12, h22, h33, h13, h23] = falls;
     const double *const x1 = &columns_[widths_[block].first_number], *const x2 = x1 + width, *const x3 = x2 + width;
@@ -218,6 +258,20 @@ void ContactSolve::add_contact(std::size_t block, const Falls& falls, double* fr
       for (std::size_t m = 0; m < width; ++m) row[places_[m]] += gathered_[m];
     }
   });
+}
+
+/// The same of turns, at places_.
+void ContactSolve::add_turns(std::size_t block, double* front, std::size_t stride) {
+  const auto& [h44, h45, h55, h66, h43, h53, h63] = factored_turns_[contact_of_[block]];
+  const std::size_t width = widths_[block].numbers;
+  const auto row = [&](const std::vector<double>& numbers, std::size_t k) { return &numbers[widths_[block].first_number + (k - 1) * width]; };
+  const double *const x4 = row(columns_, 4), *const x5 = row(columns_, 5), *const x6 = row(columns_, 6);
+  const double *const y3 = row(across_, 3), *const y4 = row(across_, 4), *const y5 = row(across_, 5), *const y6 = row(across_, 6);
+  for (std::size_t n = 0; n < width; ++n) {
+    const double a3 = h43 * x4[n] + h53 * x5[n] + h63 * x6[n], a4 = h44 * x4[n] + h45 * x5[n], a5 = h45 * x4[n] + h55 * x5[n], a6 = h66 * x6[n];
+    double* const to = front + places_[n] * stride;
+    for (std::size_t m = 0; m < width; ++m) to[places_[m]] += a3 * y3[m] + a4 * y4[m] + a5 * y5[m] + a6 * y6[m];
+  }
 }
 
 /// Of each number of a block, its place in a front where its groups begin at these.
@@ -245,6 +299,7 @@ void ContactSolve::add_linear(std::size_t block, const Rows& rows, double* front
 
 void ContactSolve::factor(const Rows& rows) {
   factored_ = falls_;
+  factored_turns_ = turn_falls_;
   is_factored_ = true;
   ++factors_;
   std::ranges::fill(diagonal_, 1.0);
@@ -257,7 +312,7 @@ void ContactSolve::factor(const Rows& rows) {
   }
   frontal_.factor(diagonal_, [this, &rows](std::size_t k, double* front, std::size_t stride, const std::size_t* at) {
     const Block& block = product_.blocks[k];
-    if (block.touches) return add_contact(k, factored_[contact_of_[k]], front, stride, at);
+    if (block.touches) return add_contact(k, front, stride, at);
     add_linear(k, rows, front, stride, at);
   });
 }
@@ -266,12 +321,12 @@ void ContactSolve::factor(const Rows& rows) {
 void ContactSolve::correct(const Rows& rows) {
   bool any_left = any_linear_, near = is_factored_;
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
-    for (std::size_t j = rows.first[c]; j < rows.first[c] + 3; ++j) {
+    for (std::size_t j = rows.first[c]; j < end_of(rows, c); ++j) {
       const auto k = static_cast<Eigen::Index>(j);
       change_[k] = pushes_[k] - rows.multipliers[j] - z_[k];
       any_left = any_left || change_[k] != 0;
     }
-    near = near && is_near(factored_[c], falls_[c]);
+    near = near && is_near(factored_[c], falls_[c]) && are_near(factored_turns_[c], turn_falls_[c], falls_[c][3]);
   }
   if (!any_left) {
     moved_.setZero();
@@ -300,12 +355,17 @@ void ContactSolve::correct(const Rows& rows) {
       continue;
     }
     const auto& [h11, h12, h22, h33, h13, h23] = factored_[contact_of_[k]];
-    if (h11 == 0 && h22 == 0 && h33 == 0) continue;
-    double opens[3];
+    if (!falls_at_all(contact_of_[k])) continue;
+    double opens[kTurning];
     open(k, motion_.data(), opens);
     change[0] -= h11 * opens[0] + h12 * opens[1] + h13 * opens[2];
     change[1] -= h12 * opens[0] + h22 * opens[1] + h23 * opens[2];
     change[2] -= h33 * opens[2];
+    if (block.rows != kTurning) continue;
+    const auto& [h44, h45, h55, h66, h43, h53, h63] = factored_turns_[contact_of_[k]];
+    change[3] -= h44 * opens[3] + h45 * opens[4] + h43 * opens[2];
+    change[4] -= h45 * opens[3] + h55 * opens[4] + h53 * opens[2];
+    change[5] -= h66 * opens[5] + h63 * opens[2];
   }
   multiply(change_, moved_);
 }
@@ -313,8 +373,8 @@ void ContactSolve::correct(const Rows& rows) {
 /// With pushes_ of what this share of the correction leads to.
 double ContactSolve::slope(const Rows& rows, double share) const {
   double sum = 0;
-  for (const std::size_t first : rows.first) {
-    for (std::size_t j = first; j < first + 3; ++j) {
+  for (std::size_t c = 0; c < rows.first.size(); ++c) {
+    for (std::size_t j = rows.first[c]; j < end_of(rows, c); ++j) {
       const auto k = static_cast<Eigen::Index>(j);
       sum += (rows.multipliers[j] + z_[k] + share * change_[k] - pushes_[k]) * moved_[k];
     }
@@ -358,7 +418,8 @@ void ContactSolve::solve_linear_rows(const Rows& rows) {
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(rows.first[c]);
     falls_[c] = {};
-    for (Eigen::Index k = at; k < at + 3; ++k) pushes_[k] = rows.multipliers[static_cast<std::size_t>(k)] + z_[k];
+    turn_falls_[c] = {};
+    for (Eigen::Index k = at; k < static_cast<Eigen::Index>(end_of(rows, c)); ++k) pushes_[k] = rows.multipliers[static_cast<std::size_t>(k)] + z_[k];
   }
   correct(rows);
   z_ += change_;
@@ -373,8 +434,9 @@ bool ContactSolve::solve_with_own_loads(const Rows& rows) {
     correct(rows);
     ++corrections_;
     double most = 0, size = 0;
-    for (const std::size_t first : rows.first) {
-      for (std::size_t j = first; j < first + 3; ++j) size = std::max(size, std::abs(change_[static_cast<Eigen::Index>(j)]));
+    for (std::size_t c = 0; c < rows.first.size(); ++c) {
+      const std::size_t first = rows.first[c];
+      for (std::size_t j = first; j < end_of(rows, c); ++j) size = std::max(size, std::abs(change_[static_cast<Eigen::Index>(j)]));
       most = std::max(most, rows.multipliers[first + 2] + z_[static_cast<Eigen::Index>(first + 2)]);
     }
     const bool rounded = size <= kRoundedLoad * most && size > kHardlyLess * size_before;
@@ -415,13 +477,13 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
   std::ranges::copy(right_side, b_.begin());
   z_.setZero();
   for (std::size_t c = 0; c < rows.first.size(); ++c) {
-    for (std::size_t j = rows.first[c]; j < rows.first[c] + 3; ++j) z_[static_cast<Eigen::Index>(j)] = rows.guess[j];
+    for (std::size_t j = rows.first[c]; j < end_of(rows, c); ++j) z_[static_cast<Eigen::Index>(j)] = rows.guess[j];
     loads_[c] = std::max(0.0, rows.multipliers[rows.first[c] + 2] + rows.guess[rows.first[c] + 2]);
   }
   factors_ = 0;
   solve_linear_rows(rows);
   corrections_ = 0;
-  const bool rubs = std::ranges::any_of(rows.laws, [](const ContactLaw& law) { return law.friction > 0; });
+  const bool rubs = std::ranges::any_of(rows.laws, [](const ContactLaw& law) { return law.friction > 0 || law.rolling > 0 || law.torsion > 0; });
   double enough = kFirstDone, changed_before = std::numeric_limits<double>::infinity();
   for (rounds_ = 1; rounds_ <= kMostLoadRounds; ++rounds_) {
     multiply(z_, gaps_);
@@ -431,8 +493,8 @@ void ContactSolve::solve(const Rows& rows, std::span<double> right_side) {
       correct(rows);
       ++corrections_;
       double work = 0;
-      for (const std::size_t first : rows.first) {
-        for (std::size_t j = first; j < first + 3; ++j) {
+      for (std::size_t c = 0; c < rows.first.size(); ++c) {
+        for (std::size_t j = rows.first[c]; j < end_of(rows, c); ++j) {
           const auto row = static_cast<Eigen::Index>(j);
           work += std::abs((rows.multipliers[j] + z_[row] + change_[row]) * b_[row]);
         }

@@ -6,6 +6,12 @@
 //   lambda_n = h^2 k max(-(g + lift), 0)                         presses
 //   lambda_t = -mu N s / max(|s|, h v_s)                         rubs: sticks, creeping by v_s at most, or slides against its way
 //
+// One that resists turning has three more: how far both bodies have turned against each other about the two directions across, r, and about the
+// normal, w, times an arm l, so that they are lengths and forces like the others:
+//
+//   lambda_r = -(mu_r / l) N r / max(|r|, h v_s)                 rolling friction: a moment of mu_r N at most
+//   lambda_w = -(mu_w / l) N w / max(|w|, h v_s)                 torsional friction: mu_w N
+//
 // lift takes from the gap what the motion did not make: depth that a step found and the last one did not bear comes to push slowly, and gives no
 // energy to speak of; where it is negative what strikes is to go apart by so much. N, the load that friction goes by, is that of the round before; rounds go on until it stands still. Of a round the solution
 // is the least of a convex function of the motion,
@@ -54,6 +60,8 @@ struct ContactLaw {
   double friction = 0;   // mu
   double creep = 0;      // h v_s [m]
   double lift = 0;       // [m]
+  double rolling = 0;    // mu_r / l, of one with rows of turns
+  double torsion = 0;    // mu_w / l, likewise
 };
 
 class ContactSolve {
@@ -72,7 +80,7 @@ class ContactSolve {
     const double* columns;  // X
     std::size_t number_stride, row_stride;
   };
-  /// Rows that are felt by the same groups, each of which has one term: a contact's, or others.
+  /// Rows that are felt by the same groups, each of which has one term: a contact's, three or, where it resists turning, six; or others.
   struct Block {
     std::size_t first, rows;
     std::size_t first_term, last_term;
@@ -104,8 +112,9 @@ class ContactSolve {
   int factors() const { return factors_; }
 
  private:
-  /// H of a contact: across 11, 12, 22; along the normal; what an opening takes from friction, 13 and 23.
+  /// H of a contact: across 11, 12, 22; along the normal; what an opening takes from friction, 13 and 23. Of its turns: 44, 45, 55; 66; 43, 53, 63.
   using Falls = std::array<double, 6>;
+  using TurnFalls = std::array<double, 7>;
   /// The load that friction goes by: of the round before, or what presses in the motion itself.
   enum class Load { of_last_round, own };
   void read();
@@ -114,12 +123,18 @@ class ContactSolve {
   void open(std::size_t block, const double* motion, double* openings) const;
   void solve_linear_rows(const Rows& rows);
   void find_pushes(const Rows& rows, const Eigen::VectorXd& gaps, Load load);
+  static void find_turn_pushes(const ContactLaw& law, double borne, double fall, const double* turns, double* pushes, TurnFalls& falls);
   bool solve_with_own_loads(const Rows& rows);
   std::array<double, 2> renew_loads(const Rows& rows);
   void correct(const Rows& rows);
-  bool is_near(const Falls& factored, const Falls& now) const;
+  static bool is_near(const Falls& factored, const Falls& now);
+  static bool are_near(const TurnFalls& factored, const TurnFalls& now, double along);
+  bool falls_at_all(std::size_t contact) const;
   void factor(const Rows& rows);
-  void add_contact(std::size_t block, const Falls& falls, double* front, std::size_t stride, const std::size_t* at);
+  void add_contact(std::size_t block, double* front, std::size_t stride, const std::size_t* at);
+  void add_turns(std::size_t block, double* front, std::size_t stride);
+  /// Behind the last row of a contact.
+  std::size_t end_of(const Rows& rows, std::size_t contact) const { return rows.first[contact] + rows_of_[contact]; }
   void add_linear(std::size_t block, const Rows& rows, double* front, std::size_t stride, const std::size_t* at);
   void find_places(const Block& block, const std::size_t* at);
   double slope(const Rows& rows, double share) const;
@@ -136,6 +151,7 @@ class ContactSolve {
   std::vector<double> gathered_;                // scratch, as many as the widest block has
   std::vector<std::size_t> places_;             // likewise
   std::vector<std::size_t> contact_of_;         // of each block that touches, which
+  std::vector<std::size_t> rows_of_;            // of each contact, how many
   std::vector<std::size_t> row_group_;          // of each other block, the group that its rows are
   FrontalSolve frontal_;
   std::vector<double> diagonal_, motion_;       // of each unknown
@@ -143,6 +159,7 @@ class ContactSolve {
   Eigen::VectorXd pushes_;                      // of rows of contacts
   std::vector<Falls> falls_;                    // of each contact
   std::vector<Falls> factored_;                 // that the factor was made with
+  std::vector<TurnFalls> turn_falls_, factored_turns_;  // the same of turns
   std::vector<double> loads_;                   // N of each contact, times h^2
   std::vector<double> changes_;                 // by which a round would change them
   double share_of_change_ = 1;                  // that loads go by

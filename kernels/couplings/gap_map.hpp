@@ -8,12 +8,13 @@
 //   shift     n = axis of A      gap n.(x_B - x_A)              force n
 //   product   a of A, b of B     gap a.b                        couple b x a
 //   length    n = d / |d|        gap |d| - length               force n
+//   turn      u = sin(theta/2) l   gap 2 length a.u          couple length (cos(theta/2) a + u x a)
 //   halfway   b = H a            gap b.(x_B - x_A)              force b, couple (m + t x m) / 2,   m = b x (x_B - x_A)
 //   angle     R = A^T B          roll atan2(R_zy, R_zz)         couple (R_xx a_x + R_yx a_y) / (R_xx^2 + R_yx^2)
 //                                pitch atan2(-R_zx, c)          couple (R_xx a_y - R_yx a_x) / c,   c^2 = R_xx^2 + R_yx^2
 //                                yaw atan2(R_yx, R_xx)          couple a_z - R_zx (that of roll)
 //
-// H turns by half the angle theta from A to B about their common axis l, and t = tan(theta/4) l: where B turns against A by w, H does by
+// B is turned against A by theta about l, their common axis. H turns by half of that, and t = tan(theta/4) l: where B turns against A by w, H does by
 // (w - t x w) / 2. Without t x m what pushes is a force at the point half-way between x_A and x_B, as Drake's bushing does.
 //
 //   joint i on the way to b:  S_i^T Ad_{T_i}^T (couple + (x_B - o_i) x force, force);  on the way to a: minus that
@@ -59,20 +60,32 @@ Gap<S> gap_of_angle(int angle, const Mat3<S>& A, const Mat3<S>& B) {
   return {atan2(yx, xx), none, a_z - zx * rolls};
 }
 
+/// How B is turned against A: cos(theta/2), sin(theta/2) l.
+template <class S>
+struct HalfTurn {
+  S w;
+  Vec3<S> u;
+  HalfTurn(const Mat3<S>& A, const Mat3<S>& B) {
+    using std::max, std::sqrt;
+    constexpr double kHalfTurn = 1e-12;  // 1 + trace, of a turn that has two axes
+    S sum(1.0);
+    Vec3<S> sine{S(0.0), S(0.0), S(0.0)};  // 2 sin(theta) l
+    for (const int k : {0, 1, 2}) {
+      const Vec3<S> a = axis_of(A, k), b = axis_of(B, k);
+      sum = sum + dot(a, b);
+      sine = sine + cross(a, b);
+    }
+    w = S(0.5) * sqrt(max(sum, as<S>(kHalfTurn)));
+    u = sine / (S(4.0) * w);
+  }
+};
+
 /// Of a shift along an axis of the frame half-way; d: from x_A to x_B.
 template <class S>
 Gap<S> gap_halfway(int axis, const Vec3<S>& d, const Mat3<S>& A, const Mat3<S>& B) {
-  using std::max, std::sqrt;
-  constexpr double kHalfTurn = 1e-12;  // 1 + trace, of a turn that has two frames half-way
-  S sum(1.0);
-  Vec3<S> sine{S(0.0), S(0.0), S(0.0)};  // 2 sin(theta) l
-  for (const int k : {0, 1, 2}) {
-    const Vec3<S> a = axis_of(A, k), b = axis_of(B, k);
-    sum = sum + dot(a, b);
-    sine = sine + cross(a, b);
-  }
-  const S w = S(0.5) * sqrt(max(sum, as<S>(kHalfTurn)));  // cos(theta/2)
-  const Vec3<S> u = sine / (S(4.0) * w), t = u / (S(1.0) + w);  // sin(theta/2) l, tan(theta/4) l
+  const HalfTurn<S> turn(A, B);
+  const Vec3<S>& u = turn.u;
+  const Vec3<S> t = u / (S(1.0) + turn.w);  // tan(theta/4) l
   const Vec3<S> a = axis_of(A, axis), turned = cross(u, a), b = a + turned + cross(t, turned), m = cross(b, d);
   return {dot(b, d), b, S(0.5) * (m + cross(t, m))};
 }
@@ -91,6 +104,11 @@ Gap<S> gap_of(const GapRow& row, double length, const Placement<S>& A, const Pla
     return {dot(a, b), none, cross(b, a)};
   }
   if (row.kind == GapKind::angle) return gap_of_angle(row.a, A.R, B.R);
+  if (row.kind == GapKind::turn) {
+    const HalfTurn<S> turn(A.R, B.R);
+    const Vec3<S> a = axis_of(A.R, row.a);
+    return {as<S>(2 * length) * dot(turn.u, a), none, as<S>(length) * (turn.w * a + cross(turn.u, a))};
+  }
   if (row.kind == GapKind::halfway) return gap_halfway(row.a, d, A.R, B.R);
   const S distance = sqrt(dot(d, d));
   return {distance - as<S>(length), d / distance, none};

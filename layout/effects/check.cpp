@@ -140,6 +140,8 @@ class Checker {
       if (!(material.stiffness > 0)) fail(fmt::format("stiffness is {}", material.stiffness), "a positive number, infinite where it is rigid", "leave it out");
       not_negative("damping", material.damping);
       not_negative("friction", material.friction);
+      not_negative("rolling_friction", material.rolling_friction);
+      not_negative("torsional_friction", material.torsional_friction);
       if (!(material.restitution >= 0 && material.restitution <= 1)) fail(fmt::format("restitution is {}", material.restitution), "0 to 1", "0 where nothing bounces");
     }
     if (contact.materials.empty()) fail("it has no material", "one at least", "leave materials as they are");

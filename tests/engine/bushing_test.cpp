@@ -231,6 +231,25 @@ TEST_CASE("A damper about an axis is worked against at torque over damping, turn
   CHECK(simulation.positions()[0] > 6 * std::numbers::pi);
 }
 
+TEST_CASE("A body that swings through the right angle of its bushing's pitch, where roll and yaw are one, gains nothing") {
+  const Model model = mounted({}, Springs(2, 0));
+  double most = 0;
+  for (int start = 0; start < 20; ++start) {
+    Simulation simulation(model, weightless(2.5e-3));
+    simulation.set_positions(where(Vector3d::Zero(), {0.05 * start, 80 * kDegree, 0.3}));
+    std::vector<double> v(6, 0.0);
+    v[1] = 6;
+    v[2] = 0.1 * start - 1;
+    simulation.set_velocities(v);
+    const double begin = simulation.energy().total();
+    for (int k = 0; k < 2000; ++k) {
+      REQUIRE(simulation.step().ok());
+      most = std::max(most, simulation.energy().total() / begin);
+    }
+  }
+  CHECK(most < 1.2);
+}
+
 TEST_CASE("Two bodies on an uneven bushing keep their momenta to rounding and their energy in a band of second order, far from its rest") {
   const auto run = [](double h) {
     TreeBuilder builder("two");

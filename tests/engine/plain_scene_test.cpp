@@ -6,6 +6,7 @@
 #include "engine/initial_state.hpp"
 #include "layout/contacts.hpp"
 #include "models/build/builder.hpp"
+#include "models/build/coupled_model.hpp"
 #include "models/build/generators.hpp"
 #include "models/build/isometry.hpp"
 #include "models/shapes/contacts_of.hpp"
@@ -259,6 +260,32 @@ TEST_CASE("in the plain simulator joints that are tied are one coordinate, at li
   bounces.advance(0.5, 1000);
   CHECK(bounces.v[leader] == Approx(1));
   CHECK(bounces.v[follower] == Approx(-2));
+}
+
+TEST_CASE("the plain simulator leaves couplings alone that nothing opens but a joint whose motion is given", "[plain]") {
+  LinkSpec swings = link("swings", JointType::ball, 1, 0.02), held = link("held", JointType::revolute, 1, 0.005);
+  held.parent = "swings";
+  held.axis = Eigen::Vector3d(1, 2, 3).normalized();
+  held.placement.translation() = Eigen::Vector3d(0.3, 0.1, -0.2);
+  CouplingSpec guide;
+  guide.kind = CouplingKind::slider;
+  guide.link_a = "swings";
+  guide.link_b = "held";
+  guide.frame_a = held.placement;
+  guide.frame_a.rotate(Eigen::AngleAxisd(0.7, held.axis));
+  const Model model = coupled(TreeBuilder("held").add(swings).add(held).build(), {guide});
+  const Index row = row_of(model, "held_joint");
+  Effects effects;
+  effects.motions = {{row, {{0}, {0.7}}}};
+  for (const double turned : {0.3, 0.9, 1.4, 2.2}) {
+    PlainScene scene(model, effects, kNone);
+    VectorXd start = scene.q;
+    start.head<4>() = Eigen::Quaterniond(Eigen::AngleAxisd(turned, Eigen::Vector3d(2, -1, 1).normalized())).coeffs();
+    start[4] = 0.7;
+    scene.start(start, numbers({0.4, -0.3, 0.8, 0}));
+    CHECK((scene.q - start).norm() < 1e-12);
+    CHECK((scene.v - numbers({0.4, -0.3, 0.8, 0})).norm() < 1e-12);
+  }
 }
 
 TEST_CASE("a push within a step of the plain simulator gives its whole impulse", "[plain]") {

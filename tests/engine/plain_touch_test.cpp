@@ -82,6 +82,32 @@ TEST_CASE("a plain ball rolls down with five sevenths of the pull", "[plain_touc
   CHECK(scene.q[2] == Approx(kHalf).margin(1e-6));
 }
 
+TEST_CASE("a plain ball with rolling friction slows by five sevenths of it, and one that spins with torsional friction stops", "[plain_touch]") {
+  const Model model = on_slab(ShapeKind::sphere);
+  std::vector<std::string> notes;
+  Effects effects;
+  effects.contact = pair_contact_of(model, notes);
+  effects.contact->materials = {{.stiffness = 1e8, .friction = kFriction, .rolling_friction = 0.01, .torsional_friction = 0.02}};
+  const auto made = [&](const Vector3d& spin, double speed) {
+    reference::PlainScene scene(model, effects, {0, 0, -kGravity});
+    scene.ease_contact(1e-3);
+    VectorXd q = scene.q, v = scene.v;
+    q[2] = kHalf;
+    v.head<3>() = spin;
+    v[3] = speed;
+    scene.start(q, v);
+    return scene;
+  };
+  reference::PlainScene rolls = made({0, 3, 0}, 0.3), spins = made({0, 0, 4}, 0);
+  rolls.advance(0.2, 400);
+  CHECK(rolls.q[0] == Approx(0.06 - 5.0 / 14 * kGravity * 0.01 / kHalf * 0.04).epsilon(5e-3));
+  const double slows = 0.02 * kGravity / 0.004;
+  spins.advance(0.05, 100);
+  CHECK(spins.v[2] == Approx(4 - 0.05 * slows).epsilon(1e-2));
+  spins.advance(0.05, 100);
+  CHECK(std::abs(spins.v[2]) < 1e-6);
+}
+
 TEST_CASE("a plain block slides above the angle of friction as Coulomb has it", "[plain_touch]") {
   const double angle = std::atan(1.2 * kFriction);
   reference::PlainScene steep = scene_of(on_slab(ShapeKind::box), angle);

@@ -123,7 +123,7 @@ TEST_CASE("bytes that are no scene are refused, with what was found") {
 }
 
 TEST_CASE("bytes whose checksum was made to agree are a scene that can be simulated, or refused") {
-  constexpr std::string_view kLine = "linden scene 4\n";
+  constexpr std::string_view kLine = "linden scene 5\n";
   Model model = load_urdf(model_file("hand.urdf"), Base::fixed);
   const std::string good = to_bytes(busy_scene(model));
   const std::string body = good.substr(kLine.size(), good.size() - kLine.size() - 8);

@@ -856,7 +856,7 @@ TEST_CASE("the scenes of the page on scenes are scenes", "[scene]") {
     CHECK(parse_scene(text, folder.file("s.yaml")).model.warnings.empty());
     ++scenes;
   }
-  CHECK(scenes == 8);
+  CHECK(scenes == 9);
   CHECK_THAT(page, Contains("no joint\n\"left_kne_pitch\" moves in model \"humanoid\"; expected one that does; did you mean"));
   check_message(
       kHumanoid + "effects: {damping: {left_kne_pitch: 1}}\n", 3,

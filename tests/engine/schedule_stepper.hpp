@@ -104,7 +104,7 @@ class ScheduleStepper {
   bool stale(const Evaluated<double>& now, double before) const {
     return !fresh_ && 0.5 * now.norm * (now.norm / before) > memory.options.tolerance * memory.options.tolerance * now.scale;
   }
-  Lanes refused(Lanes) const { return 0; }
+  Lanes refused(Lanes, const Evaluated<double>&) const { return 0; }
   void put_aside(Lanes, Lanes, Lanes) {}
   Evaluated<double> cut(double share) {
     memory.share = -share;

@@ -124,7 +124,7 @@ TEST_CASE("a checkpoint that no simulation saved is refused though its checksum 
   run(simulation, 10);
   simulation.save(folder.file("state"));
   const std::string good = text_of(folder / "state");
-  const std::size_t header = good.find('\n') + 1, state = header + 104, past = state + 8 * (5 + 5 + 5 * 5 + 2);
+  const std::size_t header = good.find('\n') + 1, state = header + 112, past = state + 8 * (5 + 5 + 5 * 5 + 2);
   const auto message_with = [&](std::size_t at, auto value) {
     std::string bytes = good.substr(0, good.size() - 8);
     std::memcpy(bytes.data() + at, &value, sizeof(value));

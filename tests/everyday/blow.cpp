@@ -43,6 +43,7 @@ struct Landing {
   EverydayScene scene;
   JointLimit limit;
   std::int64_t node = 0;
+  bool at_node = true;  // else within the step before
 };
 
 /// Joints whose motion is given, those that follow others and the lengths of cables are not stopped.
@@ -87,6 +88,7 @@ std::optional<Landing> landing_of(const EverydayScene& scene) {
   if (random.uniform(0, 1) < 0.4) {
     place += random.uniform(0.05, 0.95) * (ahead[at] - q[at]);
     ++result.node;
+    result.at_node = false;
   }
   (v[result.limit.row] > 0 ? result.limit.upper : result.limit.lower) = place;
   effects.limits = {result.limit};
@@ -177,6 +179,9 @@ void check_blow(const EverydayScene& scene, Differences& found) {
     return;
   }
   compare_after(*landing, *expected, vector_of(simulation.velocities()), "simulation", found);
+  // Lanes look for blows only where something bounces: what comes to a limit at a node, to the last digits, stops within the next step. No joint
+  // does but where the limit is put there.
+  if (landing->at_node && landing->limit.restitution == 0) return;
   Batch batch(scene.model, 1, scene.options, landing->scene.effects, {.threads = 1});
   batch.reset(0, scene.start.positions, scene.start.velocities);
   batch.step(landing->node);

@@ -40,6 +40,7 @@ class Touched {
     double largest = 0;
     for (const ContactPoint& point : points) largest = std::max(largest, vector_of(point.force).norm());
     const double rounding = 1e-9 * largest;
+    const ContactMaterial& material = scene_.effects.contact->materials[0];
     for (const ContactPoint& point : points) {
       const Vector3d n = vector_of(point.normal), force = vector_of(point.force);
       const double presses = n.dot(force), rubs = (force - presses * n).norm();
@@ -48,6 +49,14 @@ class Touched {
       if (!(rubs <= mu * presses + 1e-6 * mu * std::abs(presses) + rounding)) {
         add("cone of friction", step, fmt::format("{:.6g} N across where {:.6g} N press; expected {:.3g} of it at most", rubs, presses, mu));
       }
+      const Vector3d moment = vector_of(point.moment);
+      const double spins = std::abs(n.dot(moment)), rolls = (moment - n.dot(moment) * n).norm();
+      const auto resists = [&](const char* what, double found, double length) {
+        if (found <= length * ((1 + 1e-6) * presses + rounding) + 1e-12 * moment.norm()) return;  // directions in the world are rounded
+        add(what, step, fmt::format("{:.6g} N m where {:.6g} N press; expected {:.3g} m times that at most", found, presses, length));
+      };
+      resists("rolling friction", rolls, material.rolling_friction);
+      resists("torsional friction", spins, material.torsional_friction);
     }
     // within a blow velocities are read a step late, and momenta are of those: before it and after it they are the same
     const bool apart = points.empty() && apart_;

@@ -44,8 +44,10 @@ struct Solid {
 
 class TouchingMaker {
  public:
-  TouchingMaker(std::uint64_t seed, std::uint64_t number, std::uint64_t attempt) : random_(seed * 982451653 + number + (attempt << 40)) {
+  TouchingMaker(std::uint64_t seed, std::uint64_t number, std::uint64_t attempt)
+      : random_(seed * 982451653 + number + (attempt << 40)), turning_(seed * 472882027 + number + (attempt << 40)) {
     random_.next();
+    turning_.next();
     scene_.seed = seed;
     scene_.number = number;
   }
@@ -58,6 +60,11 @@ class TouchingMaker {
     scene_.sudden = true;
     stiffness_ = spread(1e4, 1e9);
     friction_ = chance(0.2) ? 0 : random_.uniform(0.05, 1);
+    if (turning_.uniform(0, 1) < 0.4) {
+      const auto length = [this] { return turning_.uniform(0, 1) < 0.3 ? 0 : std::exp(turning_.uniform(std::log(1e-4), std::log(2e-2))); };
+      rolling_ = length();
+      torsional_ = length();
+    }
     if (deed_ == Deed::strikes) scene_.options.gravity = {0, 0, 0};
     switch (deed_) {
       case Deed::slides:
@@ -340,6 +347,8 @@ class TouchingMaker {
     PairContact contact = pair_contact_of(model, notes);
     contact.materials[0].stiffness = stiffness_;
     contact.materials[0].friction = friction_;
+    contact.materials[0].rolling_friction = rolling_;
+    contact.materials[0].torsional_friction = torsional_;
     InitialState& start = scene_.start;
     start.positions = model.neutral();
     start.velocities.assign(static_cast<std::size_t>(model.tree.shape.velocities), 0.0);
@@ -403,10 +412,10 @@ class TouchingMaker {
     effects.ground = ground;
   }
 
-  Random random_;
+  Random random_, turning_;  // the second of what resists turning alone
   EverydayScene scene_;
   Deed deed_ = Deed::slides;
-  double h_ = 1e-3, stiffness_ = 1e7, friction_ = 0;
+  double h_ = 1e-3, stiffness_ = 1e7, friction_ = 0, rolling_ = 0, torsional_ = 0;
   std::vector<Solid> fixed_, solids_;
   Matrix3d floor_turn_ = Matrix3d::Identity();
   Vector3d up_ = Vector3d::UnitZ();

@@ -16,7 +16,7 @@ namespace {
 
 using namespace linden;
 
-constexpr std::string_view kLine = "linden scene 4\n";
+constexpr std::string_view kLine = "linden scene 5\n";
 
 /// With effects of all kinds, and a joint that follows another; its steps end soon whatever is made of it.
 std::string good_bytes() {

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 
 #include "tests/kernels/allocation_counter.hpp"
@@ -42,17 +43,20 @@ struct Problem {
   std::vector<double> yields;
   std::vector<std::size_t> first;
   std::vector<ContactLaw> laws;
+  std::vector<Index> turns;  // rows of turns of each contact: 0 or 3; fewer numbers than contacts: 0 of the others
 
   explicit Problem(Index rows)
       : S(MatrixXd::Zero(rows, rows)), b(VectorXd::Zero(rows)), lambda(b), guess(b), yields(static_cast<std::size_t>(rows), 0.0) {}
 
   Index rows() const { return b.size(); }
   double yield(Index row) const { return yields[static_cast<std::size_t>(row)]; }
+  Index turns_of(std::size_t contact) const { return contact < turns.size() ? turns[contact] : 0; }
   std::vector<Index> linear_rows() const {
     std::vector<Index> list;
     for (Index k = 0; k < rows(); ++k) {
       const auto row = static_cast<std::size_t>(k);
-      const bool of_contact = std::ranges::any_of(first, [&](std::size_t at) { return row >= at && row < at + 3; });
+      bool of_contact = false;
+      for (std::size_t c = 0; c < first.size(); ++c) of_contact = of_contact || (row >= first[c] && row < first[c] + 3 + static_cast<std::size_t>(turns_of(c)));
       if (!of_contact) list.push_back(k);
     }
     return list;
@@ -73,7 +77,7 @@ struct WholeProduct {
       product.blocks.push_back({first, count, product.terms.size(), product.terms.size() + 1, touches});
       product.terms.push_back({0, S.row(static_cast<Index>(first)).data(), one.row(static_cast<Index>(first)).data(), 1, rows});
     };
-    for (const std::size_t first : problem.first) add(first, 3, true);
+    for (std::size_t c = 0; c < problem.first.size(); ++c) add(problem.first[c], 3 + static_cast<std::size_t>(problem.turns_of(c)), true);
     for (const Index row : problem.linear_rows()) add(static_cast<std::size_t>(row), 1, false);
     return product;
   }
@@ -113,18 +117,23 @@ double violation(const Problem& problem, const VectorXd& z) {
     const Vector2d s = opens.segment<2>(at), friction = -law.friction * x[at + 2] * s / std::max(s.norm(), law.creep);
     worst = std::max(worst, std::abs(x[at + 2] - law.stiffness * std::max(-(opens[at + 2] + law.lift), 0.0)) / scale);
     worst = std::max(worst, (x.segment<2>(at) - friction).norm() / scale);
+    if (problem.turns_of(c) == 0) continue;
+    const Vector2d rolls = opens.segment<2>(at + 3);
+    const double spins = opens[at + 5];
+    worst = std::max(worst, (x.segment<2>(at + 3) + law.rolling * x[at + 2] * rolls / std::max(rolls.norm(), law.creep)).norm() / scale);
+    worst = std::max(worst, std::abs(x[at + 5] + law.torsion * x[at + 2] * spins / std::max(std::abs(spins), law.creep)) / scale);
   }
   return worst;
 }
 
-/// Friction of the load N on a point that would move by `free`, and moves by free + S x: x = -drag (free + S x), drag found by bisection.
-Vector2d friction_of(double load, const ContactLaw& law, const Matrix2d& S, const Vector2d& free) {
-  double low = 0, high = law.friction * load / law.creep;
+/// Friction that is `most` or less, of a point that would move by `free`, and moves by free + S x: x = -drag (free + S x), drag found by bisection.
+Vector2d friction_of(double most, double creep, const Matrix2d& S, const Vector2d& free) {
+  double low = 0, high = most / creep;
   const auto moves = [&](double drag) { return Vector2d((Matrix2d::Identity() + drag * S).inverse() * free); };
-  if (moves(high).norm() > law.creep) {
+  if (moves(high).norm() > creep) {
     for (int k = 0; k < 200 && high - low > 1e-16 * high; ++k) {
       const double drag = (low + high) / 2;
-      (drag * moves(drag).norm() < law.friction * load ? low : high) = drag;
+      (drag * moves(drag).norm() < most ? low : high) = drag;
     }
   }
   return -high * moves(high);
@@ -145,9 +154,17 @@ VectorXd settled(const Problem& problem) {
       const double x = problem.lambda[n] + z[n], free = S.row(n) * z - problem.b[n] - S(n, n) * x + law.lift;
       const double load = std::max(0.0, -law.stiffness * free / (1 + law.stiffness * S(n, n)));
       z[n] = load - problem.lambda[n];
-      const Matrix2d across = S.block<2, 2>(at, at);
-      const Vector2d moves = S.middleRows<2>(at) * z - problem.b.segment<2>(at);
-      z.segment<2>(at) = friction_of(load, law, across, moves - across * (problem.lambda + z).segment<2>(at)) - problem.lambda.segment<2>(at);
+      const auto rub = [&](Index row, double most) {
+        const Matrix2d across = S.block<2, 2>(row, row);
+        const Vector2d moves = S.middleRows<2>(row) * z - problem.b.segment<2>(row);
+        z.segment<2>(row) = friction_of(most, law.creep, across, moves - across * (problem.lambda + z).segment<2>(row)) - problem.lambda.segment<2>(row);
+      };
+      rub(at, law.friction * load);
+      if (problem.turns_of(c) == 0) continue;
+      rub(at + 3, law.rolling * load);
+      const Index w = at + 5;
+      const double spins = S.row(w) * z - problem.b[w] - S(w, w) * (problem.lambda[w] + z[w]);
+      z[w] = friction_of(law.torsion * load, law.creep, Vector2d(S(w, w), 1).asDiagonal(), {spins, 0})[0] - problem.lambda[w];
     }
     if ((z - before).lpNorm<Eigen::Infinity>() <= 1e-15 * (1 + z.lpNorm<Eigen::Infinity>())) return z;
   }
@@ -155,25 +172,33 @@ VectorXd settled(const Problem& problem) {
   return z;
 }
 
-/// Contacts and linear rows in any order; multipliers, right sides and lifts of all signs and sizes that there are.
-Problem random_problem(Numbers& random) {
-  const Index contacts = random.count(1, 6), linear = random.count(0, 3), rows = 3 * contacts + linear;
+/// Contacts, of which this share resist turning, and linear rows in any order; multipliers, right sides and lifts of all signs and sizes that there are.
+Problem random_problem(Numbers& random, double turning = 0) {
+  const Index contacts = random.count(1, 6), linear = random.count(0, 3);
+  std::vector<Index> blocks;
+  for (Index k = 0; k < contacts; ++k) blocks.push_back(turning > 0 && random.between(0, 1) < turning ? 6 : 3);
+  const Index rows = std::accumulate(blocks.begin(), blocks.end(), linear);
   Problem problem(rows);
   const MatrixXd J = random.matrix(rows, rows + 6);
   problem.S = J * J.transpose() / static_cast<double>(rows + 6);
   problem.b = random.matrix(rows, 1);
   problem.lambda = random.matrix(rows, 1);
   problem.guess = random.matrix(rows, 1);
-  std::vector<Index> blocks(static_cast<std::size_t>(contacts), 3);
   for (Index k = 0; k < linear; ++k) blocks.insert(blocks.begin() + random.count(0, static_cast<int>(blocks.size())), 1);
   Index row = 0;
   for (const Index block : blocks) {
-    if (block == 3) {
+    if (block >= 3) {
       problem.first.push_back(static_cast<std::size_t>(row));
+      problem.turns.push_back(block - 3);
       problem.b.segment<2>(row) *= random.of_sizes(-2, 0);
       problem.b[row + 2] *= 5;
       problem.laws.push_back({random.of_sizes(-3, 3) / problem.S(row + 2, row + 2), random.between(0, 0.5), random.of_sizes(-5, -1),
                               random.count(0, 1) == 0 ? 0 : random.between(0, 0.5)});
+      if (block == 6) {
+        problem.b.segment<3>(row + 3) *= random.of_sizes(-4, 0);
+        problem.laws.back().rolling = random.count(0, 3) == 0 ? 0 : random.between(0, 0.6);
+        problem.laws.back().torsion = random.count(0, 3) == 0 ? 0 : random.between(0, 0.3);
+      }
     } else {
       const double kinds[] = {0, random.of_sizes(-2, 1), kHeld};
       problem.yields[static_cast<std::size_t>(row)] = kinds[random.count(0, 2)];
@@ -314,6 +339,64 @@ TEST_CASE("multipliers of contacts are those of the law, and all other rows clos
   CHECK(apart < 1e-9);
   CHECK(sliding > 100);
   CHECK(sticking > 20);
+}
+
+TEST_CASE("multipliers of contacts that resist turning are those of the law, whatever a solve begins with", "[contact_solve]") {
+  Numbers random(9);
+  double worst = 0, apart = 0, begun = 0;
+  int rolling = 0, clinging = 0, spinning = 0, standing = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    Problem problem = random_problem(random, 0.7);
+    CAPTURE(trial, problem.first.size(), problem.rows());
+    const VectorXd z = solved(problem), twin = settled(problem), opens = problem.S * z - problem.b;
+    REQUIRE(violation(problem, twin) < 1e-9);
+    REQUIRE(violation(problem, z) < 1e-9);
+    worst = std::max(worst, violation(problem, z));
+    apart = std::max(apart, (z - twin).lpNorm<Eigen::Infinity>() / (1 + twin.lpNorm<Eigen::Infinity>()));
+    problem.guess = 10 * random.matrix(problem.rows(), 1);
+    begun = std::max(begun, (solved(problem) - z).lpNorm<Eigen::Infinity>() / (1 + z.lpNorm<Eigen::Infinity>()));
+    for (std::size_t c = 0; c < problem.first.size(); ++c) {
+      const auto at = static_cast<Index>(problem.first[c]);
+      if (problem.turns_of(c) == 0 || problem.lambda[at + 2] + z[at + 2] <= 0) continue;
+      if (problem.laws[c].rolling > 0) ++(opens.segment<2>(at + 3).norm() > problem.laws[c].creep ? rolling : clinging);
+      if (problem.laws[c].torsion > 0) ++(std::abs(opens[at + 5]) > problem.laws[c].creep ? spinning : standing);
+    }
+  }
+  CAPTURE(worst, apart, begun, rolling, clinging, spinning, standing);
+  CHECK(apart < 1e-9);
+  CHECK(begun < 1e-9);
+  CHECK(std::min(rolling, spinning) > 100);
+  CHECK(std::min(clinging, standing) > 20);
+}
+
+TEST_CASE("rows of turns that nothing resists change nothing", "[contact_solve]") {
+  Numbers random(10);
+  for (int trial = 0; trial < 100; ++trial) {
+    Problem with = random_problem(random, 1);
+    for (ContactLaw& law : with.laws) law.rolling = law.torsion = 0;
+    Problem without(with.rows() - 3 * static_cast<Index>(with.first.size()));
+    std::vector<Index> kept;  // rows of the one in the other
+    for (Index row = 0; row < with.rows(); ++row) {
+      const auto is_turn = [&](std::size_t at) { return row >= static_cast<Index>(at) + 3 && row < static_cast<Index>(at) + 6; };
+      if (std::ranges::none_of(with.first, is_turn)) kept.push_back(row);
+    }
+    for (std::size_t c = 0; c < with.first.size(); ++c) {
+      for (Index j = static_cast<Index>(with.first[c]) + 3; j < static_cast<Index>(with.first[c]) + 6; ++j) with.lambda[j] = with.guess[j] = 0;
+      without.first.push_back(with.first[c] - 3 * c);
+    }
+    without.laws = with.laws;
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      const auto to = static_cast<Index>(k);
+      without.yields[k] = with.yields[static_cast<std::size_t>(kept[k])];
+      without.b[to] = with.b[kept[k]];
+      without.lambda[to] = with.lambda[kept[k]];
+      without.guess[to] = with.guess[kept[k]];
+      for (std::size_t j = 0; j < kept.size(); ++j) without.S(to, static_cast<Index>(j)) = with.S(kept[k], kept[j]);
+    }
+    const VectorXd z = solved(with), less = solved(without);
+    for (std::size_t k = 0; k < kept.size(); ++k) CHECK(z[kept[k]] == Approx(less[static_cast<Index>(k)]).margin(1e-10));
+    for (std::size_t c = 0; c < with.first.size(); ++c) CHECK(z.segment<3>(static_cast<Index>(with.first[c]) + 3).norm() == 0);
+  }
 }
 
 TEST_CASE("whatever a solve begins with, it ends with the same multipliers", "[contact_solve]") {
@@ -486,7 +569,7 @@ TEST_CASE("stacks of ten are solved in a few corrections", "[contact_solve]") {
 TEST_CASE("a solve of as many rows as before allocates nothing", "[contact_solve]") {
   Numbers random(6);
   Problem problem = random_problem(random);
-  while (problem.rows() != 18) problem = random_problem(random);
+  while (problem.rows() != 18 || problem.turns_of(0) == 0) problem = random_problem(random, 0.5);
   const WholeProduct whole(problem.S);
   const std::vector<double> lambda(18, 0.1), guess(18, 0.0);
   std::vector<double> z(18);

@@ -8,6 +8,7 @@
 // source  Featherstone, Rigid Body Dynamics Algorithms, 8.1; Hairer, Wanner, Solving Ordinary Differential Equations II, VII.2 (projection)
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "layout/couplings.hpp"
@@ -140,12 +141,13 @@ class PlainCouplings {
   }
 
   /// Of rows whose matrix is D: the share of right sides that they can take, least in size. free: how far each would move were no joint's motion
-  /// given.
+  /// given. What moves less than 1e-8 of that is rounding, also where nothing moves more.
   static VectorXd multipliers(const MatrixXd& D, const VectorXd& right, const VectorXd& free) {
     const VectorXd scale = free.cwiseSqrt().cwiseInverse();
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> solve;
-    solve.setThreshold(1e-8);
-    solve.compute(scale.asDiagonal() * D * scale.asDiagonal());
+    const MatrixXd moved = scale.asDiagonal() * D * scale.asDiagonal();
+    solve.setThreshold(1e-8 / std::clamp(moved.colwise().norm().maxCoeff(), 1e-8, 1.0));  // of the largest column
+    solve.compute(moved);
     return scale.cwiseProduct(solve.solve(scale.cwiseProduct(right)));
   }
 

@@ -10,6 +10,8 @@
 //   speed       J one joint, slower       goal -most                  lambda >= 0
 //   normal      J n.velocity of contact   goal -k gap / g             lambda >= 0            compliance 1 / (g dt), g = c + k dt
 //   tangents    J across, two rows        goal 0                      |(lambda)| <= friction x lambda of the normal
+//   rolling     J of turns, two rows      goal 0                      likewise, by the length of rolling friction
+//   twist       J of turns about n        goal 0                      |lambda| <= torsional friction x lambda of the normal
 //   servo       J one joint               goal pull at rest / g       |lambda| <= max dt     compliance 1 / (g dt), g = c + k dt
 //
 // Bodies touch each other (plain_touch.hpp) as one touches the ground, g = k (eases + dt): a step of implicit Euler's method takes from a spring what
@@ -33,13 +35,14 @@ namespace linden::reference {
 
 inline Vector3d vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
-enum class RowKind { friction, limit, servo, normal, tangent };
+enum class RowKind { friction, limit, servo, normal, tangent, twist };
 
 struct PlainRow {
   RowKind kind;
   Eigen::RowVectorXd J;  // [nv]
   double low, high, goal = 0, compliance = 0;
-  double friction = 0;   // of a pair of tangents: coefficient; their normal stands just before them
+  double friction = 0;   // of a pair of tangents, or a twist: coefficient [1, m]
+  Eigen::Index back = 1; // and how far before it, or the first of a pair, its normal stands
 };
 
 /// Where each velocity row's position is: of screws alone.
@@ -244,9 +247,12 @@ class PlainForces {
       const double stiffness = effects_->contact->materials[0].stiffness, g = stiffness * ((touch.gap <= 0 ? eases : 0) + dt);
       rows.push_back({RowKind::normal, parts, 0, kInfinity, -stiffness * touch.gap / g, 1 / (g * dt)});
       const Vector3d x = touch.normal.unitOrthogonal(), y = touch.normal.cross(x);
-      for (const Vector3d& across : {x, y}) {
-        rows.push_back({RowKind::tangent, across.transpose() * J, 0, 0, 0, 0, effects_->contact->materials[0].friction});
-      }
+      const ContactMaterial& material = effects_->contact->materials[0];
+      for (const Vector3d& across : {x, y}) rows.push_back({RowKind::tangent, across.transpose() * J, 0, 0, 0, 0, material.friction});
+      if (!material.resists_turning()) continue;
+      const Rows3 turns = motions[static_cast<std::size_t>(touch.slot_b)].turning - motions[static_cast<std::size_t>(touch.slot_a)].turning;
+      for (const Vector3d& across : {x, y}) rows.push_back({RowKind::tangent, across.transpose() * turns, 0, 0, 0, 0, material.rolling_friction, 3});
+      rows.push_back({RowKind::twist, touch.normal.transpose() * turns, 0, 0, 0, 0, material.torsional_friction, 5});
     }
     return rows;
   }

@@ -410,7 +410,7 @@ class PlainScene {
         const PlainRow& row = rows[static_cast<std::size_t>(r)];
         if (row.kind == RowKind::tangent) {
           // both tangents; the normal stands before them
-          const double d = std::max(D(r, r), D(r + 1, r + 1)), circle = row.friction * lambda[r - 1];
+          const double d = std::max(D(r, r), D(r + 1, r + 1)), circle = row.friction * lambda[r - row.back];
           if (d > 0) {
             Eigen::Vector2d to = lambda.segment<2>(r) - speed.segment<2>(r) / d;
             if (to.norm() > circle) to *= circle / to.norm();
@@ -421,8 +421,8 @@ class PlainScene {
         }
         const double d = D(r, r) + row.compliance;
         if (!(d > 0)) continue;
-        const double miss = row.goal - speed[r] - row.compliance * lambda[r];
-        most = std::max(most, change(r, std::clamp(lambda[r] + miss / d, row.low, row.high)));
+        const double miss = row.goal - speed[r] - row.compliance * lambda[r], twists = row.kind == RowKind::twist ? row.friction * lambda[r - row.back] : 0;
+        most = std::max(most, change(r, std::clamp(lambda[r] + miss / d, row.low - twists, row.high + twists)));
       }
       if (most <= kEnough * scale) break;
     }

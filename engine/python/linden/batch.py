@@ -31,7 +31,7 @@ class Batch:
         time, energy        energy: kinetic, potential
         com, com_velocity, momentum
         pose:L, position:L, quaternion:L, twist:L, acceleration:L, imu:L    of link L
-        contact:L                                                           points in the ground, normal force
+        contact:L                                                           places that ground or bodies push, normal force
 
     threads: 0 for all there are. instructions: "avx512", "avx2", "baseline" or "scalar"; the best there are where it is None. dtype:
     float64, or float32 for half the memory and up to twice the speed (on the ground it takes more evaluations, and more time than float64).

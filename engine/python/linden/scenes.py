@@ -20,8 +20,10 @@ MOST_WARNINGS = 5
 class Settings(TypedDict, total=False):
     """What a scene says beside its model, with the keys of a scene's file: models/scenes/README.md."""
 
-    step: float
-    """h [s], 1e-3 where it is not given."""
+    step: float | str
+    """h [s], 1e-3 where it is not given; with an accuracy "auto", as where it is not given, for steps that vary with the motion."""
+    accuracy: float
+    """Energy band over the largest kinetic energy that steps are to keep: order and steps follow from it. A Batch has none."""
     duration: float
     """[s], for those who run a scene to its end."""
     order: int

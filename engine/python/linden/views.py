@@ -128,6 +128,13 @@ def motion_of(simulation: Simulation, duration: float, fps: float) -> View:
     recorder.add_simulation(0.0, simulation)
     steps = round(duration / scene.step)
     stride = max(1, round(1 / (fps * scene.step)), math.ceil(steps * len(scene.model.bodies) / MOST_POSES))
+    if simulation.step_lengths is not None:  # frames are the ends of steps that vary
+        for frame in range(stride, steps + stride, stride):
+            before = simulation.time
+            simulation.advance_to(begin + min(frame, steps) * scene.step)
+            if simulation.time > before:
+                recorder.add_simulation(simulation.time - begin, simulation)
+        return View(recorder)
     while steps > 0:
         simulation.run(min(stride, steps))
         steps -= stride
